@@ -126,30 +126,30 @@ def calibrate(options: CalibrateOptions) -> None:
     if options.initial is not None:
         first = calibrations.read(options.initial).camera
     if scenario is not None:
-        found = _of_scenario(scenario, first, options)
+        result = _of_scenario(scenario, first, options)
     else:
         assert points is not None
         measured = read_points(points)
         calibration = fit(measured, first or CameraParameters(), f"{points}")
         colours = "" if samples is None else classes_of(read_samples(samples), f"{samples}").text()
-        found = _Found(measured, calibration, colours_text=colours)
-    texts = (found.calibration.text(), found.points_text, found.colours_text)
+        result = _Found(measured, calibration, colours_text=colours)
+    texts = (result.calibration.text(), result.points_text, result.colours_text)
     for (option, path), text in zip(options.outputs.items(), texts, strict=True):
         if path is not None:
             with whole_file(path, option) as staging:
                 staging.write_text(text, encoding="utf-8")
-    _print(found, [path for path in options.outputs.values() if path is not None])
+    _print(result, [path for path in options.outputs.values() if path is not None])
 
 
 def _check_outputs(options: CalibrateOptions) -> None:
     """Raises OutputError for files that cannot be written, or that are the same."""
     inputs = (options.points, options.initial, options.scenario, options.samples)
-    seen: dict[Path, str] = {}
+    options_by_path: dict[Path, str] = {}
     for option, path in options.outputs.items():
         if path is None:
             continue
         check_new(path, option, options.force, *inputs)
-        other = seen.setdefault(path.resolve(), option)
+        other = options_by_path.setdefault(path.resolve(), option)
         if other != option:
             raise OutputError(path, f"is the file of {other} and of {option}", "give two files")
 
@@ -177,19 +177,19 @@ def _of_scenario(name: str, initial: CameraParameters | None, options: Calibrate
     return _Found(points, calibration, points_text, classes, worst_m)
 
 
-def _print(found: _Found, files: Sequence[Path]) -> None:
-    residuals = found.calibration.residuals
+def _print(result: _Found, files: Sequence[Path]) -> None:
+    residuals = result.calibration.residuals
     assert residuals is not None
     table = facts_table()
     table.add_row("points", f"{residuals.points}")
     table.add_row("residuals", f"rms {residuals.rms_px:.3f} px, max {residuals.max_px:.3f} px")
-    if found.worst_m is not None:
-        table.add_row("worst error", f"{100.0 * found.worst_m:.3f} cm over the pitch, at the robots' tops")
-    for name in found.calibration.free:
-        table.add_row(name, f"{getattr(found.calibration.camera, name):.6g}")
+    if result.worst_m is not None:
+        table.add_row("worst error", f"{100.0 * result.worst_m:.3f} cm over the pitch, at the robots' tops")
+    for name in result.calibration.free:
+        table.add_row(name, f"{getattr(result.calibration.camera, name):.6g}")
     table.add_row("files", ", ".join(map(str, files)))
     show(table)
-    show(_by_residual(found.points, residuals.px))
+    show(_by_residual(result.points, residuals.px))
 
 
 def _by_residual(points: Sequence[ControlPoint], off_px: Sequence[float]) -> Table:

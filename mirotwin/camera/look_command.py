@@ -56,11 +56,11 @@ def look(options: LookOptions) -> int:
     measured posture as an arrow, its number and the confidence (1: as expected, 0: nearly refused). Lost robots are
     named.
     """
-    scenario, seed, network, at = options.scenario, options.seed, options.network, options.at
+    scenario, seed, network, moment = options.scenario, options.seed, options.network, options.at
     text = load(scenario, options.settings)
     tell_notes(text.notes)
     refuse_steps(text.scenario, scenario)
-    frame = at.ticks() // CONTROL_PERIOD_TICKS
+    frame = moment.ticks() // CONTROL_PERIOD_TICKS
     name = text.scenario.name
     out = options.out or Path(f"{name}-{seed}-net{network}-frame-{frame:06d}.png")
     check_new(out, "--out", options.force, scenario, options.firmware)
@@ -73,7 +73,9 @@ def look(options: LookOptions) -> int:
         view = view_of(world, network, text.origin)
         if frame >= world.periods:
             ends_s = seconds(world.periods * CONTROL_PERIOD_TICKS)
-            raise BadInput(text.origin, f"--at {at.text}", f"the run ends at {ends_s:.3f} s", "look earlier")
+            raise BadInput(
+                text.origin, f"--at {moment.text}", f"the run ends at {ends_s:.3f} s", "look earlier"
+            )
         with ProgressBar(f"simulating {name}", frame) as bar:
             while world.index < frame and not world.finished:
                 world.step()

@@ -111,11 +111,11 @@ def _classes(
     """The class of each pixel in the windows, 0 outside."""
     data = picture.pixels.astype(np.int32)
     cells = (data[..., 0] >> 4) << 12 | (data[..., 1] >> 2) << 6 | data[..., 2] >> 2
-    seen = np.zeros(cells.shape, bool)
+    covered = np.zeros(cells.shape, bool)
     for window in windows:
-        seen[window.top : window.top + window.height, window.left : window.left + window.width] = True
+        covered[window.top : window.top + window.height, window.left : window.left + window.width] = True
     kinds = np.frombuffer(table, np.uint8)[cells]
-    return np.where(seen, kinds, np.uint8(0))
+    return np.where(covered, kinds, np.uint8(0))
 
 
 def _draw_windows(brush: ImageDraw.ImageDraw, notes: Notes) -> None:
@@ -142,22 +142,26 @@ def _draw_arrows(image: Image.Image, tracker: Tracker, pairs: Sequence[Pair | No
         right, bottom = (int(max(end[axis] for end in ends)) + 5 for axis in (0, 1))
         layer = Image.new("RGBA", (4 * (right - left), 4 * (bottom - top)))
         brush = ImageDraw.Draw(layer)
-        tail, tip, one, other = [(4.0 * (x - left), 4.0 * (y - top)) for x, y in ends]
+        tail, tip, first, other = [(4.0 * (x - left), 4.0 * (y - top)) for x, y in ends]
         for colour, width in (((0, 0, 0, 200), 14), ((255, 255, 255, 255), 6)):
             brush.line([tail, tip], fill=colour, width=width)
-            brush.line([one, tip, other], fill=colour, width=width, joint="curve")
+            brush.line([first, tip, other], fill=colour, width=width, joint="curve")
         layer = layer.reduce(4)
         image.paste(layer, (left, top), layer)
 
 
 def _arrow(tracker: Tracker, pair: Pair) -> tuple[Point, Point, Point, Point] | None:
     """Tail, tip and both ends of the head in the enlarged picture; None where the lens cannot draw them."""
-    at = pair.sighting
-    sine, cosine = sincos(at.theta_rad)
+    sighting = pair.sighting
+    sine, cosine = sincos(sighting.theta_rad)
     ends = ((0.0, 0.0), (ARROW_M, 0.0), (ARROW_M - HEAD_M, 0.6 * HEAD_M), (ARROW_M - HEAD_M, -0.6 * HEAD_M))
     try:
         tail, tip, left, right = (
-            _point(tracker, at.x_m + ahead * cosine - aside * sine, at.y_m + ahead * sine + aside * cosine)
+            _point(
+                tracker,
+                sighting.x_m + ahead * cosine - aside * sine,
+                sighting.y_m + ahead * sine + aside * cosine,
+            )
             for ahead, aside in ends
         )
     except ValueError:
@@ -178,20 +182,20 @@ def _cross(brush: ImageDraw.ImageDraw, u: float, v: float) -> None:
 
 
 def _labels(tracker: Tracker, notes: Notes) -> list[_Label]:
-    found = []
+    labels = []
     for slot, (robot, pair) in enumerate(zip(tracker.robots, notes.pairs, strict=True)):
         if pair is not None:
             middle = 0.5 * SCALE * (pair.u + pair.identity_u), 0.5 * SCALE * (pair.v + pair.identity_v)
             arrow = _arrow(tracker, pair)
             tip = None if arrow is None else arrow[1]
-            found.append(_Label(f"{robot}", f"{pair.sighting.confidence:.2f}", middle, ASIDE_PX, tip, WHITE))
+            labels.append(_Label(f"{robot}", f"{pair.sighting.confidence:.2f}", middle, ASIDE_PX, tip, WHITE))
             continue
         windows = [window for window in notes.windows if window.slot == slot]
         if windows:
             box = _window_box(windows[-1])
             middle = 0.5 * (box.left + box.right), 0.5 * (box.top + box.bottom)
-            found.append(_Label(f"{robot}", "lost", middle, 0.5 * (box.right - box.left) + 6.0, None, LOST))
-    return found
+            labels.append(_Label(f"{robot}", "lost", middle, 0.5 * (box.right - box.left) + 6.0, None, LOST))
+    return labels
 
 
 def _draw_labels(brush: ImageDraw.ImageDraw, labels: Sequence[_Label], team: str, sheet: Box) -> None:
@@ -208,12 +212,12 @@ def _draw_labels(brush: ImageDraw.ImageDraw, labels: Sequence[_Label], team: str
         others.append(box)
         words = ((0.0, label.number, INK[team], bold), (first, label.text, label.colour, font))
         for x, text, colour, its_font in words:
-            at = (box.left + x, box.bottom)
-            brush.text(at, text, colour, its_font, anchor="ls", stroke_width=2, stroke_fill=BLACK)
+            corner = (box.left + x, box.bottom)
+            brush.text(corner, text, colour, its_font, anchor="ls", stroke_width=2, stroke_fill=BLACK)
 
 
-def _around(at: Point, reach: float) -> Box:
-    return Box(at[0] - reach, at[1] - reach, at[0] + reach, at[1] + reach)
+def _around(middle: Point, reach: float) -> Box:
+    return Box(middle[0] - reach, middle[1] - reach, middle[0] + reach, middle[1] + reach)
 
 
 def _places(label: _Label, width: float, height: float) -> list[Box]:

@@ -92,17 +92,17 @@ def parse(data: bytes, origin: str, place: str = "") -> Picture:
             warnings.simplefilter("ignore")  # of a size that is refused below, of what is not looked at
             image = Image.open(io.BytesIO(data), formats=("PNG", "PPM"))
             if image.size != (WIDTH, HEIGHT):
-                what = f"{image.size[0]} x {image.size[1]} pixels"
+                reason = f"{image.size[0]} x {image.size[1]} pixels"
                 remedy = f"give pictures of {WIDTH} x {HEIGHT} (of a run: `run --frames`)"
-                raise BadInput(origin, place, what, remedy)
+                raise BadInput(origin, place, reason, remedy)
             return Picture(image.convert("RGB").convert("YCbCr").tobytes())
     except UnidentifiedImageError:
         raise BadInput(origin, place, "is no PNG or PPM picture", "convert it to PNG") from None
     except Image.DecompressionBombError:
-        what = "far too many pixels"
-        raise BadInput(origin, place, what, f"give pictures of {WIDTH} x {HEIGHT}") from None
+        reason = "far too many pixels"
+        raise BadInput(origin, place, reason, f"give pictures of {WIDTH} x {HEIGHT}") from None
     except BadInput:
         raise
     except _DAMAGED as error:
-        what = f"is damaged: {error}"
-        raise BadInput(origin, place, what, "write the picture again") from None
+        reason = f"is damaged: {error}"
+        raise BadInput(origin, place, reason, "write the picture again") from None

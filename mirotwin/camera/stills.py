@@ -55,23 +55,23 @@ def _of_folder(path: Path, network: int) -> Iterator[Still]:
 
 def _of_recording(path: Path, network: int, tell: Callable[[str], None]) -> Iterator[Still]:
     check_regular(path)
-    found = False
+    any_frame = False
     with path.open("rb") as file:
         messages = Messages(file.read, f"{path}", (ImageMessage,))
         try:
             for place, message in messages:
                 if place.network == network:
-                    found = True
+                    any_frame = True
                     data = picture.parse(
                         message.data, f"{path}", f"{topic_name(IMAGE, network)} at tick {message.tick}"
                     )
                     yield Still(f"tick {message.tick}", message.tick, data)
         except BrokenOff as error:
-            if not found:
+            if not any_frame:
                 raise
             tell(str(error))
         messages.check_ours()
-    if not found:
+    if not any_frame:
         what = f"no frames of the camera of network {network}"
         raise messages.error(what, "record them: mirotwin run .. --record-frames")
     if messages.broken_off:

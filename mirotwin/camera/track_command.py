@@ -82,18 +82,18 @@ def track(options: TrackOptions) -> None:
     tracker = _tracker(options, robots)
     from mirotwin.camera.stills import stills  # loads the pictures' library
 
-    found = dict.fromkeys(robots, 0)
+    counts_by_robot = dict.fromkeys(robots, 0)
     frames = 0
     for frame, still in enumerate(stills(options.path, options.network, complain)):
         if not frame and not as_json:
             click.echo(HEADING)
-        for robot, seen in zip(robots, tracker.track(still.picture, still.tick), strict=True):
-            found[robot] += seen is not None
+        for robot, sighting in zip(robots, tracker.track(still.picture, still.tick), strict=True):
+            counts_by_robot[robot] += sighting is not None
             line = _json_line if as_json else _row
-            show_line(line(frame, _utf8(still.name), still.tick, robot, seen))
+            show_line(line(frame, _utf8(still.name), still.tick, robot, sighting))
         frames = frame + 1
     if not as_json:
-        counts = ", ".join(f"robot {robot} in {count}" for robot, count in found.items())
+        counts = ", ".join(f"robot {robot} in {count}" for robot, count in counts_by_robot.items())
         click.echo(f"{amount(frames, 'picture')}: {counts}")
 
 
@@ -110,16 +110,16 @@ def _utf8(name: str) -> str:
     return name.encode("utf-8", "surrogateescape").decode("utf-8", "backslashreplace")
 
 
-def _json_line(frame: int, name: str, tick: int, robot: int, seen: Sighting | None) -> str:
+def _json_line(frame: int, name: str, tick: int, robot: int, sighting: Sighting | None) -> str:
     """What is measured is null for a lost robot."""
-    line = {"frame": frame, "picture": name, "tick": tick, "robot": robot, "lost": seen is None}
-    measured = {field: getattr(seen, field, None) for field in ("x_m", "y_m", "theta_rad", "confidence")}
+    line = {"frame": frame, "picture": name, "tick": tick, "robot": robot, "lost": sighting is None}
+    measured = {field: getattr(sighting, field, None) for field in ("x_m", "y_m", "theta_rad", "confidence")}
     return msgspec.json.encode(line | measured).decode()
 
 
-def _row(frame: int, name: str, tick: int, robot: int, seen: Sighting | None) -> str:
+def _row(frame: int, name: str, tick: int, robot: int, sighting: Sighting | None) -> str:
     place = f"{'lost':>9} {'':>9} {'':>12} {'':>11}"
-    if seen is not None:
-        degrees = _DEGREES * seen.theta_rad
-        place = f"{100.0 * seen.x_m:9.2f} {100.0 * seen.y_m:9.2f} {degrees:12.2f} {seen.confidence:11.2f}"
+    if sighting is not None:
+        degrees = _DEGREES * sighting.theta_rad
+        place = f"{100.0 * sighting.x_m:9.2f} {100.0 * sighting.y_m:9.2f} {degrees:12.2f} {sighting.confidence:11.2f}"
     return f"{frame:6d} {robot:6d} {place}  {name}"

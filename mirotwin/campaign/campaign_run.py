@@ -107,14 +107,14 @@ def _run(plan: Plan, results: Path, options: CampaignOptions) -> Tally:
 
 def _judge(plan: Plan, results: Path) -> int:
     """Says what went wrong; returns the exit code."""
-    found = counted(results, LINES)
-    for verdict, (count, first) in found.items():
+    counts = counted(results, LINES)
+    for verdict, (count, first) in counts.items():
         if verdict != "passed":
             _list(verdict, first)
             if count > len(first):
                 complain(f"{verdict}: {count - len(first)} more of {count}")
     errors, faults, failed, unjudged = (
-        found.get(name, (0, []))[0] for name in ("error", "fault", "failed", "not judged")
+        counts.get(name, (0, []))[0] for name in ("error", "fault", "failed", "not judged")
     )
     if errors:
         complain(f"{errors} of {plan.runs} runs have an error; {results} says which")

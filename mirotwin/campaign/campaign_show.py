@@ -89,15 +89,15 @@ def show(options: ShowOptions) -> int:
 def _show(rows: ResultRows, metrics: Sequence[str], by: Sequence[str], as_json: bool) -> None:
     groups = rows.groups(by)
     arms = rows.arms(by, groups, metrics)
-    found = [arm for arm, _ in islice(arms, None if as_json else MOST_GROUPS)]
+    shown = [arm for arm, _ in islice(arms, None if as_json else MOST_GROUPS)]
     if as_json:
-        _print_json({"results": str(rows.path), "runs": rows.count, "groups": found})
+        _print_json({"results": str(rows.path), "runs": rows.count, "groups": shown})
         return
     show_line(f"{rows.path}: {amount(rows.count, 'run')} of {rows.about.campaign}")
-    show_table(_groups_table(found))
-    if len(groups) > len(found):
+    show_table(_groups_table(shown))
+    if len(groups) > len(shown):
         show_line(
-            f"{amount(len(groups) - len(found), 'more group')}: --by names fewer factors, --json shows all"
+            f"{amount(len(groups) - len(shown), 'more group')}: --by names fewer factors, --json shows all"
         )
 
 
@@ -107,8 +107,8 @@ def _groups_table(groups: Sequence[Arm]) -> Table:
     for group in groups:
         head = [*(f"{level}" for level in group.factors.values()), f"{group.runs}"]
         head += [f"{group.verdicts[name]}" for name in SHARES]
-        for name, found in group.metrics.items():
-            table.add_row(*head, _labelled(group.metric_label(name)), *_cells(found))
+        for name, metric_figures in group.metrics.items():
+            table.add_row(*head, _labelled(group.metric_label(name)), *_cells(metric_figures))
             head = [""] * len(head)
     return table
 
@@ -120,27 +120,27 @@ def _labelled(metric: str) -> str:
     return f"{metric} (1: yes)" if metric in (*SHARES, UNSETTLED) else metric
 
 
-def _cells(found: Figures | None) -> list[str]:
-    if found is None:
+def _cells(figures: Figures | None) -> list[str]:
+    if figures is None:
         return ["0"]
-    spread = [_number(found.quantiles[share]) for share in ("0.05", "0.95", "1")]
-    return [f"{found.count}", _number(found.median), _interval(found.median_interval), *spread]
+    spread = [_number(figures.quantiles[share]) for share in ("0.05", "0.95", "1")]
+    return [f"{figures.count}", _number(figures.median), _interval(figures.median_interval), *spread]
 
 
 def _compare(rows: ResultRows, text: str, metrics: Sequence[str], as_json: bool) -> int:
     name, first, second = rows.two_levels(text)
     pairs = paired_levels(rows, name, first, second)
     if not pairs:
-        what = f"no run with {first} has a twin with {second}"
-        raise BadInput(rows.path, "--between", what, "the campaign has to be complete")
-    found = [one for one, _ in differences(metrics, rows, rows, pairs)]
+        reason = f"no run with {first} has a twin with {second}"
+        raise BadInput(rows.path, "--between", reason, "the campaign has to be complete")
+    compared = [one for one, _ in differences(metrics, rows, rows, pairs)]
     if as_json:
-        _print_json({"factor": name, "first": first, "second": second, "differences": found})
+        _print_json({"factor": name, "first": first, "second": second, "differences": compared})
         return DONE
     show_line(
         f"{rows.path}: {name}, {second} against {first}, {amount(len(pairs), 'pair')} with the same seed"
     )
-    show_table(_differences_table(found, f"{first}", f"{second}"))
+    show_table(_differences_table(compared, f"{first}", f"{second}"))
     return DONE
 
 
@@ -151,20 +151,20 @@ def _against(rows: ResultRows, path: Path, metrics: Sequence[str], tolerance: fl
     pairs = paired(baseline, rows)
     seeds = len(set(rows.samples()[[second for _, second in pairs]].tolist()))
     if seeds < FEWEST_FOR_GATE:
-        what = f"has only {amount(seeds, 'seed')} in common with {rows.path}"
-        raise BadInput(path, "", what, f"a gate needs {FEWEST_FOR_GATE}; give both campaigns more seeds")
-    found = [one for one, _ in differences(metrics, baseline, rows, pairs)]
-    worse = [one for one in found if one.worse(tolerance)]
+        reason = f"has only {amount(seeds, 'seed')} in common with {rows.path}"
+        raise BadInput(path, "", reason, f"a gate needs {FEWEST_FOR_GATE}; give both campaigns more seeds")
+    compared = [difference for difference, _ in differences(metrics, baseline, rows, pairs)]
+    worse = [difference for difference in compared if difference.worse(tolerance)]
     ours, theirs = rows.column("digest"), baseline.column("digest")
     same = [theirs[first] == ours[second] for first, second in pairs].count(True)
     if as_json:
-        names = [one.metric for one in worse]
+        names = [difference.metric for difference in worse]
         _print_json(
             {
                 "against": str(path),
                 "pairs": len(pairs),
                 "same_digest": same,
-                "differences": found,
+                "differences": compared,
                 "worse": names,
             }
         )
@@ -172,49 +172,49 @@ def _against(rows: ResultRows, path: Path, metrics: Sequence[str], tolerance: fl
         show_line(
             f"{rows.path} against {path}: {amount(len(pairs), 'pair')} of runs, {same} with the same digest"
         )
-        show_table(_differences_table(found, "before", "now"))
+        show_table(_differences_table(compared, "before", "now"))
     for ours_only, where, there in ((rows, rows.path, path), (baseline, path, rows.path)):
         if unpaired := ours_only.count - len(pairs):
             complain(f"{unpaired} of {ours_only.count} runs of {where} are not in {there}")
-    for one in worse:
-        complain(f"worse than {path}: {_sentence(one)}")
+    for difference in worse:
+        complain(f"worse than {path}: {_sentence(difference)}")
     return exit_code("failed" if worse else "passed")
 
 
-def _differences_table(found: Sequence[MetricDifference], first: str, second: str) -> Table:
+def _differences_table(compared: Sequence[MetricDifference], first: str, second: str) -> Table:
     means = (first, second, "difference", "95 % interval", "median")
     table = plain_table("metric", right=("pairs", "left out", "seeds", *means, "higher", "lower"))
-    for one in found:
+    for difference in compared:
         table.add_row(
-            _labelled(one.metric),
-            f"{one.pairs}",
-            f"{one.without}",
-            f"{one.seeds}",
-            _number(one.first),
-            _number(one.second),
-            f"{one.difference:+.4g}",
-            _interval(one.interval),
-            f"{one.median:+.4g}",
-            f"{one.higher}",
-            f"{one.lower}",
+            _labelled(difference.metric),
+            f"{difference.pairs}",
+            f"{difference.without}",
+            f"{difference.seeds}",
+            _number(difference.first),
+            _number(difference.second),
+            f"{difference.difference:+.4g}",
+            _interval(difference.interval),
+            f"{difference.median:+.4g}",
+            f"{difference.higher}",
+            f"{difference.lower}",
         )
     return table
 
 
-def _sentence(one: MetricDifference) -> str:
+def _sentence(difference: MetricDifference) -> str:
     """What has got worse, by how much, and with which interval."""
-    means = f"from {_number(one.first)} to {_number(one.second)}"
-    interval = f" (95 % interval {_interval(one.interval)})" if one.interval is not None else ""
-    of = f"{amount(one.pairs, 'pair')} of {amount(one.seeds, 'seed')}"
-    return f"{one.metric} by {one.difference:+.4g}{interval} in the mean of {of}, {means}"
+    means = f"from {_number(difference.first)} to {_number(difference.second)}"
+    interval = f" (95 % interval {_interval(difference.interval)})" if difference.interval is not None else ""
+    of = f"{amount(difference.pairs, 'pair')} of {amount(difference.seeds, 'seed')}"
+    return f"{difference.metric} by {difference.difference:+.4g}{interval} in the mean of {of}, {means}"
 
 
 def _number(value: float) -> str:
     return f"{value:.4g}"
 
 
-def _interval(found: Interval | None) -> str:
-    return "too few" if found is None else f"{found.low:.4g} to {found.high:.4g}"
+def _interval(interval: Interval | None) -> str:
+    return "too few" if interval is None else f"{interval.low:.4g} to {interval.high:.4g}"
 
 
 def _print_json(document: dict[str, Any]) -> None:

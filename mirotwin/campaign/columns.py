@@ -81,7 +81,7 @@ class _Run:
 
 def _at(*way: str) -> Callable[[_Run], Any]:
     """What stands there: None where a struct on the way is."""
-    return lambda run: reduce(lambda at, part: at and getattr(at, part), way, run)
+    return lambda run: reduce(lambda value, part: value and getattr(value, part), way, run)
 
 
 COLUMNS: Mapping[str, tuple[type, Callable[[_Run], Any]]] = {

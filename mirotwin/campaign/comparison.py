@@ -60,7 +60,7 @@ def differences(
     metrics: Sequence[str], first: ResultRows, second: ResultRows, pairs: Sequence[tuple[int, int]]
 ) -> list[tuple[MetricDifference, Numbers]]:
     """Of each metric that both rows of a pair (row of `first`, row of `second`) have, with second minus first."""
-    found = []
+    compared = []
     places, samples = np.array(pairs, dtype=np.int64).reshape(-1, 2), second.samples()
     for name in metrics:
         before, after = first.numbers(name)[places[:, 0]], second.numbers(name)[places[:, 1]]
@@ -81,5 +81,5 @@ def differences(
             higher=int(np.count_nonzero(apart > 0.0)),
             lower=int(np.count_nonzero(apart < 0.0)),
         )
-        found.append((of_metric, apart))
-    return found
+        compared.append((of_metric, apart))
+    return compared

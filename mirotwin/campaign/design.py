@@ -125,10 +125,10 @@ class Design(msgspec.Struct, frozen=True):
 
     @property
     def runs(self) -> int:
-        found = self.seed_count * self.draw_count
+        count = self.seed_count * self.draw_count
         for factor in self.factors:
-            found *= len(factor.levels)
-        return found
+            count *= len(factor.levels)
+        return count
 
     @property
     def names(self) -> list[str]:
@@ -148,6 +148,6 @@ class Design(msgspec.Struct, frozen=True):
 
     def settings(self, point: DesignPoint) -> tuple[str, ...]:
         """What a point sets, in the order of the file."""
-        found = [setting for level in point.levels for setting in level.settings]
-        found += [draw.setting(value) for draw, value in zip(self.draws, point.drawn, strict=True)]
-        return tuple(found)
+        settings = [setting for level in point.levels for setting in level.settings]
+        settings += [draw.setting(value) for draw, value in zip(self.draws, point.drawn, strict=True)]
+        return tuple(settings)

@@ -29,8 +29,8 @@ MAX_DEAD_EXECUTORS = 20
 def outcomes_of(jobs: Sequence[Work], workers: Workers) -> Iterator[RunOutcome]:
     """The outcome of each job in their order, numbered from 0, as soon as it and those before it are there."""
     drive = Drive(lambda run: msgspec.structs.replace(jobs[run], run=run), workers)
-    with closing(drive.outcomes(range(len(jobs)))) as found:
-        yield from in_order(found)
+    with closing(drive.outcomes(range(len(jobs)))) as outcomes:
+        yield from in_order(outcomes)
 
 
 class Drive:
@@ -80,8 +80,8 @@ class Drive:
         # the reader puts outcomes in order: while one run is slow, those after it fill its memory
         if self._pending and self._next - min(self._pending.values()) >= SPREAD:
             return None
-        found, self._next = self._next, next(self._runs, None)
-        return found
+        chosen, self._next = self._next, next(self._runs, None)
+        return chosen
 
     def _take(self, done: Iterable[Future[RunOutcome]]) -> Iterator[RunOutcome]:
         lost = []
@@ -127,7 +127,7 @@ class Drive:
             self._executor.shutdown(cancel_futures=True)
 
     def _gone(self) -> BadInput:
-        what = "workers have ended, and with them what was under way"
+        reason = "workers have ended, and with them what was under way"
         return BadInput(
-            "", self.workers.option, what, "start them again, and give the same command: it goes on"
+            "", self.workers.option, reason, "start them again, and give the same command: it goes on"
         )

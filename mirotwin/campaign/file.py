@@ -83,17 +83,22 @@ def _parsed(text: str, path: Path) -> Plan:
     with BadInput.at(path):
         raw = tables(text)
         check_numbers(raw)
-        found = struct_of(raw, Document)
-        design = _design(found, path)
-        scenario, firmware = _scenario(found.scenario, path, SCENARIO), _image(found.firmware, path, FIRMWARE)
-    settings = [(setting, f"set.{setting.partition('=')[0]}") for setting in in_text(found.set)]
-    settings += [(f"{EXPECT}{key}={inline(value)}", f"expect.{key}") for key, value in found.expect.items()]
+        document = struct_of(raw, Document)
+        design = _design(document, path)
+        scenario, firmware = (
+            _scenario(document.scenario, path, SCENARIO),
+            _image(document.firmware, path, FIRMWARE),
+        )
+    settings = [(setting, f"set.{setting.partition('=')[0]}") for setting in in_text(document.set)]
+    settings += [
+        (f"{EXPECT}{key}={inline(value)}", f"expect.{key}") for key, value in document.expect.items()
+    ]
     return Plan(
         path=str(path),
         scenario=scenario,
         firmware=firmware,
         settings=tuple(settings),
-        allowed_failed_share=found.allowed_failed_share,
+        allowed_failed_share=document.allowed_failed_share,
         design=design,
     )
 
@@ -109,22 +114,22 @@ def _image(name: str, path: Path, place: str) -> str:
         return str(Path(path_beside(path, name)).resolve()) if name else ""
 
 
-def _design(found: Document, path: Path) -> Design:
+def _design(document: Document, path: Path) -> Design:
     try:
-        seeds = seeds_of(str(found.seeds), MOST_RUNS)
+        seeds = seeds_of(str(document.seeds), MOST_RUNS)
     except ValueError as error:
         raise TomlError(f"{error}", place="seeds") from None
     design = Design(
         first_seed=seeds[0],
         seed_count=len(seeds),
-        factors=(*_grid(found.grid, path), *_factors(found.factor)),
-        draws=tuple(_draws(found.random)) if found.random else (),
-        draw_count=found.random.count if found.random else 1,
-        draw_seed=found.random.seed if found.random else 0,
+        factors=(*_grid(document.grid, path), *_factors(document.factor)),
+        draws=tuple(_draws(document.random)) if document.random else (),
+        draw_count=document.random.count if document.random else 1,
+        draw_seed=document.random.seed if document.random else 0,
     )
     names = design.names
-    for at, name in enumerate(names):
-        if name in names[:at]:
+    for index, name in enumerate(names):
+        if name in names[:index]:
             raise TomlError("is varied in two ways", "keep one of them", name)
     if design.runs > MOST_RUNS:
         raise TomlError(f"has {design.runs} runs; at most {MOST_RUNS}", "take fewer levels or seeds")
@@ -171,8 +176,8 @@ def _draws(random: Random) -> Iterator[Draw]:
         try:
             yield draw_of(key, value)
         except TomlError as error:
-            what = ": ".join(filter(None, (f"{error.place}", error.what)))
-            raise TomlError(what, error.remedy, f"random.range.{key}") from None
+            reason = ": ".join(filter(None, (f"{error.place}", error.what)))
+            raise TomlError(reason, error.remedy, f"random.range.{key}") from None
 
 
 def _leaves(table: dict[str, Any], ends: Callable[[Any], bool], above: str = "") -> Iterator[tuple[str, Any]]:

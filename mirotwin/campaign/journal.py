@@ -78,10 +78,10 @@ class Journal:
 
     def missing(self) -> Iterator[int]:
         """Runs without an outcome, from the first one on; what is added meanwhile is not missing."""
-        at = self.done.find(0)
-        while at >= 0:
-            yield at
-            at = self.done.find(0, at + 1)
+        run = self.done.find(0)
+        while run >= 0:
+            yield run
+            run = self.done.find(0, run + 1)
 
     def _count(self, run: int) -> None:
         self.done[run] = 1
@@ -98,8 +98,10 @@ class Journal:
             self._stream.write(json_bytes(self.head) + b"\n")
             return
         if difference:
-            what = f"holds the unfinished results of another campaign: {difference}"
-            raise BadInput(self.path, "", what, "choose another file with --out, or start again with --force")
+            reason = f"holds the unfinished results of another campaign: {difference}"
+            raise BadInput(
+                self.path, "", reason, "choose another file with --out, or start again with --force"
+            )
         for outcome, end in outcomes(self.path):
             if not 0 <= outcome.run < self.head.runs:
                 raise BadInput(
@@ -143,10 +145,10 @@ def outcomes(path: Path) -> Iterator[tuple[RunOutcome, int]]:
                 return
             end += len(line)
             try:
-                found = decoder.decode(line)
+                outcome = decoder.decode(line)
             except (msgspec.DecodeError, UnicodeDecodeError):
                 raise BadInput(path, number, "is no outcome of a run", "start again with --force") from None
-            yield found, end
+            yield outcome, end
 
 
 def in_order(outcomes: Iterable[RunOutcome]) -> Iterator[RunOutcome]:

@@ -92,33 +92,33 @@ def _by(rows: ResultRows) -> tuple[str, ...]:
 def _arms(rows: ResultRows, by: tuple[str, ...], metrics: Sequence[str], made: dict[str, Any]) -> list[Arm]:
     from mirotwin.campaign.plots import spread  # loads Bokeh
 
-    found = list(rows.arms(by, rows.groups(by), metrics))
+    arms = list(rows.arms(by, rows.groups(by), metrics))
     for name in metrics:
-        if drawn := [(arm, numbers[name]) for arm, numbers in found if arm.metrics[name] is not None]:
+        if drawn := [(arm, numbers[name]) for arm, numbers in arms if arm.metrics[name] is not None]:
             made[f"plot-{name}"] = spread(name, drawn)
-    return [arm for arm, _ in found]
+    return [arm for arm, _ in arms]
 
 
 def _comparisons(rows: ResultRows, made: dict[str, Any]) -> list[dict[str, Any]]:
     """Each level of a factor against its first one. `figure`: id of its figure's element, "" where there is none."""
     from mirotwin.campaign.plots import apart  # loads Bokeh
 
-    found: list[dict[str, Any]] = []
+    comparisons: list[dict[str, Any]] = []
     for factor in rows.about.factors:
         first, *others = rows.levels(factor)
         for second in others[: MOST_LEVELS - 1]:
             pairs = paired_levels(rows, factor, first, second)
-            if not pairs or len(found) == MOST_COMPARISONS:
+            if not pairs or len(comparisons) == MOST_COMPARISONS:
                 continue
             compared = differences(GATED, rows, rows, pairs)
             shown = [(one, numbers) for one, numbers in compared if one.metric in SHOWN]
             figure = ""
             if any(one.first and one.interval for one, _ in shown):
-                figure = f"plot-pairs-{len(found)}"
+                figure = f"plot-pairs-{len(comparisons)}"
                 made[figure] = apart(shown)
             levels = {"factor": factor, "first": first, "second": second, "pairs": len(pairs)}
-            found.append({**levels, "differences": [one for one, _ in compared], "figure": figure})
-    return found
+            comparisons.append({**levels, "differences": [one for one, _ in compared], "figure": figure})
+    return comparisons
 
 
 def _failed(rows: ResultRows) -> list[tuple[int, str, int, str, str]]:
@@ -136,8 +136,8 @@ def _failed(rows: ResultRows) -> list[tuple[int, str, int, str, str]]:
 def _badge(counts: dict[str, int]) -> tuple[str, str]:
     """A word, and the numbers after it."""
     wrong = [name for name in reversed(VERDICTS) if name != "passed" and counts.get(name)]
-    said = ", ".join(f"{counts[name]} {VERDICTS[name].badge}" for name in wrong)
-    return judge(wrong), said or f"{counts['passed']} runs passed"
+    text = ", ".join(f"{counts[name]} {VERDICTS[name].badge}" for name in wrong)
+    return judge(wrong), text or f"{counts['passed']} runs passed"
 
 
 def _data(rows: ResultRows) -> bytes:

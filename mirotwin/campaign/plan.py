@@ -116,14 +116,14 @@ class Plan(msgspec.Struct, frozen=True):
     def varied(self, run: int) -> dict[str, Value]:
         """The columns of a run that its plan says."""
         point = self.design.point(run)
-        found: dict[str, Value] = {
+        levels: dict[str, Value] = {
             factor.name: level.value for factor, level in zip(self.design.factors, point.levels, strict=True)
         }
         for draw, value in zip(self.design.draws, point.drawn, strict=True):
-            found[draw.name] = as_kind(value, kind_of(draw.ends()))
+            levels[draw.name] = as_kind(value, kind_of(draw.ends()))
         if self.design.draws:
-            found["draw"] = point.draw
-        return {**found, "seed": point.seed}
+            levels["draw"] = point.draw
+        return {**levels, "seed": point.seed}
 
 
 def plan_of_levels(name: str, levels: Sequence[Level], seeds: range, settings: Sequence[str] = ()) -> Plan:
@@ -142,8 +142,8 @@ def checked(plan: Plan, settings: Sequence[str] = ()) -> Plan:
     for setting, place in plan.settings:
         key = setting.partition("=")[0].strip()
         if key in plan.design.names:
-            what = f"the campaign varies {key}, this would have no effect"
-            raise BadInput(plan.path, place, what, "leave it out, or the key in the campaign's file")
+            reason = f"the campaign varies {key}, this would have no effect"
+            raise BadInput(plan.path, place, reason, "leave it out, or the key in the campaign's file")
     return _tried(msgspec.structs.replace(plan, scenarios=_scenarios(plan), images=_images(plan)))
 
 
@@ -173,35 +173,35 @@ def _tried_points(design: Design) -> Iterator[DesignPoint]:
     tried: list[Sequence[Any]] = [factor.levels for factor in design.factors]
     tried += [draw.ends() for draw in design.draws]
     points = [[one[0] for one in tried]]
-    for at, others in enumerate(tried):
-        points += [[*points[0][:at], other, *points[0][at + 1 :]] for other in others[1:]]
+    for index, others in enumerate(tried):
+        points += [[*points[0][:index], other, *points[0][index + 1 :]] for other in others[1:]]
     for point in points:
         levels, drawn = point[: len(design.factors)], point[len(design.factors) :]
         yield DesignPoint(tuple(levels), tuple(drawn), 0, design.first_seed)
 
 
 def _scenarios(plan: Plan) -> dict[str, str]:
-    found = {}
+    texts = {}
     for name, place in _named(plan, plan.scenario, "scenario"):
         try:
             own = ("expect={}",) if name in builtin_names() else ()  # a campaign varies what it presupposes
-            found[name] = load(name, own).text
+            texts[name] = load(name, own).text
         except ScenarioError as error:
             raise BadInput(plan.path, place, f"{error}") from None
-    return found
+    return texts
 
 
 def _images(plan: Plan) -> dict[str, ImageCopy]:
-    found = {}
+    copies = {}
     for name, place in _named(plan, plan.firmware, "firmware"):
         path = "" if name == OWN_IMAGE else name
         try:
             image = load_firmware(path)
             names = {name: (at.address, at.space) for name, at in image.symbols.names.items()}
-            found[name] = ImageCopy(f"{image.path}", image.sha256, image.content, json_bytes(names))
+            copies[name] = ImageCopy(f"{image.path}", image.sha256, image.content, json_bytes(names))
         except BadInput as error:
             raise BadInput(plan.path, place, f"{error}") from None
-    return found
+    return copies
 
 
 def _named(plan: Plan, default: str, kind: str) -> Iterator[tuple[str, str]]:
@@ -234,8 +234,8 @@ def _placed_note(plan: Plan, places: dict[str, str], note: str) -> str:
 
 def _placed(plan: Plan, places: dict[str, str], error: BadInput) -> BadInput:
     """`error`, at the place of the campaign's file that made it; with its whole line where no single place did."""
-    found = f"{error.place}"
+    key = f"{error.place}"
     for setting, place in places.items():
-        if found in (" ".join(option_words(setting)), setting.partition("=")[0]):
+        if key in (" ".join(option_words(setting)), setting.partition("=")[0]):
             return BadInput(plan.path, place, f"{setting} in {error.path}: {error.what}", error.remedy)
     return BadInput(plan.path, "", f"{error}")

@@ -38,7 +38,7 @@ def spread(metric: str, arms: Sequence[tuple[Arm, Numbers]]) -> Any:
     made = _rows(metric, labels)
     _dots(made, [(label, numbers) for label, (_, numbers) in zip(labels, arms, strict=True)])
     _widen(made, LEAST[metric], *(numbers for _, numbers in arms))
-    quantiles = [found.quantiles for arm, _ in arms if (found := arm.metrics[metric]) is not None]
+    quantiles = [figures.quantiles for arm, _ in arms if (figures := arm.metrics[metric]) is not None]
     shares = {share: [one[share] for one in quantiles] for share in ("0.05", "0.25", "0.5", "0.75", "0.95")}
     source = ColumnDataSource({"arm": labels, **shares})
     whisker = made.segment(x0="0.05", x1="0.95", y0="arm", y1="arm", source=source, line_width=1.4)
@@ -52,9 +52,9 @@ def spread(metric: str, arms: Sequence[tuple[Arm, Numbers]]) -> Any:
     return made
 
 
-def apart(found: Sequence[tuple[MetricDifference, Numbers]]) -> Any:
+def apart(compared: Sequence[tuple[MetricDifference, Numbers]]) -> Any:
     """Differences in per cent of the first one's mean: each pair a dot, the mean with its interval."""
-    shown = [(one, numbers) for one, numbers in found if one.first and one.interval is not None]
+    shown = [(one, numbers) for one, numbers in compared if one.first and one.interval is not None]
     labels = [one.metric for one, _ in shown]
     made = _rows("difference, % of the first's mean", labels)
     made.add_layout(tagged(Span(location=0.0, dimension="height", line_width=1.2), line_color="ink"))

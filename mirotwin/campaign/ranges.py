@@ -46,8 +46,8 @@ def draw_of(key: str, value: Any) -> Draw:
         raise TomlError(f"expected a range, got {value!r}", "write { from = .., to = .. }")
     if CHOOSE in value:
         return Draw(key, choices=struct_of(value, Choice).choose)
-    found = struct_of(value, Range)
-    low, high, scale, whole = msgspec.structs.astuple(found)
+    range_of_key = struct_of(value, Range)
+    low, high, scale, whole = msgspec.structs.astuple(range_of_key)
     if scale not in ("linear", "log"):
         raise TomlError(f"scale: {scale!r} is not one of the choices", "use linear or log")
     if not low < high or not math.isfinite(high - low):

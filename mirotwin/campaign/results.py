@@ -112,15 +112,15 @@ def write(plan: Plan, journal: Path, results: Path) -> None:
         pq.ParquetWriter(wall_file, wall, compression="zstd") as walls,
     ):
         count = 0
-        found = in_order(one for one, _ in outcomes(journal))
-        while group := list(islice(found, ROWS)):
+        ordered = in_order(one for one, _ in outcomes(journal))
+        while group := list(islice(ordered, ROWS)):
             count += len(group)
             rows.write_table(_table([_row(plan, one) for one in group], schema))
             walls.write_table(_table([{"run": one.run, "wall_s": one.wall_s} for one in group], wall))
         if count != plan.runs:
-            what = f"has the outcome of {count} of {plan.runs} runs: it was changed while the campaign went"
+            reason = f"has the outcome of {count} of {plan.runs} runs: it was changed while the campaign went"
             raise OutputError(
-                journal, what, "give the same command again, which makes the runs that are missing"
+                journal, reason, "give the same command again, which makes the runs that are missing"
             )
 
 
@@ -182,27 +182,27 @@ def _check_columns(path: str | Path, table: pa.Table, about: ResultsInfo) -> Non
         places = table.schema.get_all_field_indices(name)
         kind = f"{table.schema.field(places[0]).type}" if len(places) == 1 else "nothing"
         if kind not in EACH_ROW.get(name, ("int64", "double", "bool", "string")):
-            what = "there is no such column" if kind == "nothing" else f"holds {kind}"
+            reason = "there is no such column" if kind == "nothing" else f"holds {kind}"
         elif table[name].null_count:
-            what = "lacks a value in some row"
+            reason = "lacks a value in some row"
         else:
             continue
-        raise BadInput(path, f"column {shortened(name)}", what, GIVE)
+        raise BadInput(path, f"column {shortened(name)}", reason, GIVE)
 
 
 def counted(path: Path, listed: int) -> dict[str, tuple[int, list[tuple[int, str]]]]:
     """Verdict -> how many runs have it, and the first ones: number, and what the row says of it."""
-    found: dict[str, tuple[int, list[tuple[int, str]]]] = {}
+    counts: dict[str, tuple[int, list[tuple[int, str]]]] = {}
     with _opened(path) as (file, _):
         for batch in file.iter_batches(columns=["run", "verdict", "error", "failure"]):
             for run, verdict, error, failure in zip(
                 *(column.to_pylist() for column in batch.columns), strict=True
             ):
-                count, first = found.get(verdict, (0, []))
+                count, first = counts.get(verdict, (0, []))
                 if len(first) < listed:
                     first.append((run, error or failure))
-                found[verdict] = (count + 1, first)
-    return found
+                counts[verdict] = (count + 1, first)
+    return counts
 
 
 def _schema(plan: Plan) -> pa.Schema:
@@ -234,6 +234,6 @@ def _table(rows: list[dict[str, Any]], schema: pa.Schema) -> pa.Table:
         try:
             columns.append(pa.array([row[field.name] for row in rows], field.type))
         except (pa.ArrowException, TypeError, OverflowError):
-            what = f"runs {rows[0]['run']} to {rows[-1]['run']} have a value that is no {field.type}"
-            raise BadInput("", field.name, what, "start again with --force") from None
+            reason = f"runs {rows[0]['run']} to {rows[-1]['run']} have a value that is no {field.type}"
+            raise BadInput("", field.name, reason, "start again with --force") from None
     return pa.Table.from_arrays(columns, schema=schema)

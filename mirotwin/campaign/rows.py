@@ -88,21 +88,21 @@ class ResultRows:
         """The values of a column. Raises BadInput where there is none."""
         if self.table.column_names.count(name) != 1:
             raise BadInput(self.path, name, "there is no such column", "run the campaign again")
-        found: list[Any] = self.table[name].to_pylist()
-        return found
+        values: list[Any] = self.table[name].to_pylist()
+        return values
 
     def numbers(self, name: str) -> Numbers:
         """One for each row; NaN where a run does not have it."""
         if name in SHARES:
-            found = [verdict == name for verdict in self.column("verdict")]
+            values = [verdict == name for verdict in self.column("verdict")]
         elif name == UNSETTLED:
-            found = [None if settled is None else not settled for settled in self.column("settled")]
+            values = [None if settled is None else not settled for settled in self.column("settled")]
         elif name.startswith(CHECK):
-            found = [None if one is None else one == "failed" for one in self.column(name)]
+            values = [None if one is None else one == "failed" for one in self.column(name)]
         else:
-            found = self.column(name)
+            values = self.column(name)
         try:
-            return np.array(found, dtype=np.float64)
+            return np.array(values, dtype=np.float64)
         except (TypeError, ValueError):
             raise BadInput(self.path, name, "holds no numbers", "run the campaign again") from None
 
@@ -122,10 +122,10 @@ class ResultRows:
         for name in by:
             self._check_factor(name, "--by")
         columns = [self.column(name) for name in by]
-        found: dict[tuple[Value, ...], list[int]] = {}
+        rows_of: dict[tuple[Value, ...], list[int]] = {}
         for row in range(self.count):
-            found.setdefault(tuple(column[row] for column in columns), []).append(row)
-        return found
+            rows_of.setdefault(tuple(column[row] for column in columns), []).append(row)
+        return rows_of
 
     def arms(
         self, by: Sequence[str], groups: Mapping[tuple[Value, ...], list[int]], metrics: Sequence[str]
@@ -166,8 +166,8 @@ class ResultRows:
         if not equals and len(levels) == 2:
             return name, levels[0], levels[1]
         by_text = {word: level for level in levels for word in (inline(level), f"{level}")}
-        for at in (place for place, char in enumerate(values) if char == ","):
-            first, second = by_text.get(values[:at].strip()), by_text.get(values[at + 1 :].strip())
+        for comma in (place for place, char in enumerate(values) if char == ","):
+            first, second = by_text.get(values[:comma].strip()), by_text.get(values[comma + 1 :].strip())
             if first is not None and second is not None and first != second:
                 return name, first, second
         shown = ", ".join(f"{level}" for level in levels)
@@ -179,14 +179,14 @@ class ResultRows:
 def paired(before: ResultRows, after: ResultRows) -> list[tuple[int, int]]:
     """Rows of the same runs in two files. Raises BadInput where there are none."""
     if sorted(before.varied) != sorted(after.varied):
-        what = f"varies {', '.join(before.varied) or 'nothing'}, not {', '.join(after.varied) or 'nothing'}"
-        raise BadInput(before.path, "", what, "give the results of a campaign with the same factors")
+        reason = f"varies {', '.join(before.varied) or 'nothing'}, not {', '.join(after.varied) or 'nothing'}"
+        raise BadInput(before.path, "", reason, "give the results of a campaign with the same factors")
     places = {key: row for row, key in enumerate(before.keys())}
-    found = [(places[key], row) for row, key in enumerate(after.keys()) if key in places]
-    if not found:
-        what = f"has no run in common with {after.path}"
-        raise BadInput(before.path, "", what, "give results with the same seeds and values")
-    return found
+    pairs = [(places[key], row) for row, key in enumerate(after.keys()) if key in places]
+    if not pairs:
+        reason = f"has no run in common with {after.path}"
+        raise BadInput(before.path, "", reason, "give results with the same seeds and values")
+    return pairs
 
 
 def paired_levels(rows: ResultRows, name: str, first: Value, second: Value) -> list[tuple[int, int]]:

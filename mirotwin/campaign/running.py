@@ -33,8 +33,8 @@ class Tally(msgspec.Struct):
 def refuse_many(plan: Plan, agreed: bool) -> None:
     """Raises BadInput for more than `MANY_RUNS` runs, unless the user `agreed`."""
     if plan.runs > MANY_RUNS and not agreed:
-        what = f"has {plan.runs} runs, more than {MANY_RUNS}"
-        raise BadInput(plan.path, "", what, "take fewer seeds or levels, or say --yes")
+        reason = f"has {plan.runs} runs, more than {MANY_RUNS}"
+        raise BadInput(plan.path, "", reason, "take fewer seeds or levels, or say --yes")
 
 
 def run(
@@ -83,6 +83,6 @@ def _complete(results: Path, plan: Plan) -> bool:
         return False
     difference = plan.head.difference(tables.read_about(results).head)
     if difference:
-        what = f"holds the results of another campaign: {difference}"
-        raise BadInput(results, "", what, "choose another file with --out, or replace it with --force")
+        reason = f"holds the results of another campaign: {difference}"
+        raise BadInput(results, "", reason, "choose another file with --out, or replace it with --force")
     return True

@@ -38,8 +38,8 @@ def prepared(
     origin: str, text: str, settings: tuple[str, ...]
 ) -> tuple[ScenarioText, dict[RobotId, list[Check]], list[Step]]:
     """A scenario with its settings made, what it expects, and its steps. Raises BadInput for one that cannot be run."""
-    found = of_text(text, origin, settings)
-    return found, expectations_of(found.scenario, origin), steps_of(found.scenario, origin)
+    spec = of_text(text, origin, settings)
+    return spec, expectations_of(spec.scenario, origin), steps_of(spec.scenario, origin)
 
 
 @lru_cache(maxsize=64)
@@ -100,7 +100,9 @@ def _failure(run: Run, result: Result) -> str:
 
 def _verdicts(expectations: Iterable[Expectation]) -> dict[str, str]:
     """Verdicts of the run and of checks that steps began; a name that is there twice has its worst verdict."""
-    found: dict[str, str] = {}
-    for one in expectations:
-        found[one.name] = judge([found.get(one.name, one.verdict), one.verdict])
-    return found
+    verdicts: dict[str, str] = {}
+    for expectation in expectations:
+        verdicts[expectation.name] = judge(
+            [verdicts.get(expectation.name, expectation.verdict), expectation.verdict]
+        )
+    return verdicts

@@ -131,9 +131,9 @@ def _median_interval(ordered: Numbers, of_seed: Seeds, count: int) -> Interval |
         quantile(np.repeat(ordered, np.bincount(drawn, minlength=count)[of_seed]), 0.5)
         for drawn in draws(count)
     ]
-    found = np.sort(np.array(medians))
+    in_order = np.sort(np.array(medians))
     beyond = _below(-math.sqrt(count / (count - 1)) * student(count - 1))
-    return Interval(quantile(found, beyond), quantile(found, 1.0 - beyond))
+    return Interval(quantile(in_order, beyond), quantile(in_order, 1.0 - beyond))
 
 
 def _below(deviations: float) -> float:

@@ -58,8 +58,8 @@ def versions() -> Versions:
 def versions_here(wanted: Versions) -> Versions:
     """The versions of this process, with the plug-ins of `wanted` as they were when it first looked."""
     names = [part.partition(": ")[0].partition(" ") for part in wanted.parts]
-    found = (described_once(kind, name) for kind, _, name in names)
-    return msgspec.structs.replace(versions(), parts=tuple(part for part in found if part))
+    described = (described_once(kind, name) for kind, _, name in names)
+    return msgspec.structs.replace(versions(), parts=tuple(part for part in described if part))
 
 
 @cache

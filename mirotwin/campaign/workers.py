@@ -47,8 +47,8 @@ class WorkerContext(SpawnContext):
         if UNGUARDED in codes:
             raise BadInput("", "campaign.run", *GUARD)
         if FAILED in codes and not any(one.done() and one.exception() is None for one in self.begun):
-            what = "its processes import your script first, which fails in them for the reason above"
-            raise BadInput("", "campaign.run", what, GUARD[1])
+            reason = "its processes import your script first, which fails in them for the reason above"
+            raise BadInput("", "campaign.run", reason, GUARD[1])
 
 
 def refuse_in_import() -> None:

@@ -130,17 +130,17 @@ def _try(rule: Rule, port: RobotPort, topology: Topology) -> tuple[Failure | Non
     fresh = script.fresh % 256
 
     @script.expects(last.end_tick, f"{amount(fresh, 'frame')} accepted by {last.what}", by_answers=True)
-    def counted(seen: Observed) -> Found:
-        said = [one.said for one in seen.answers if one.frame.seq == last.seq and one.said is not None]
+    def counted(observed: Observed) -> Found:
+        said = [one.said for one in observed.answers if one.frame.seq == last.seq and one.said is not None]
         found = f"{said[-1].accepted}" if said else "no answer"
         if found != f"{fresh}":
-            yield seen.end_tick, found
+            yield observed.end_tick, found
 
     sent = _whole(script.said)
     port.greet((script.n,), sent)
     # from here on: what greeting took says nothing of the trial
     cursor, begun = Cursor(port.log), len(port.late_ticks)
-    seen = Observed(script.n, slot)
+    observed = Observed(script.n, slot)
 
     # the quickest answer took the firmware's own time; what is over is the way there and back
     shortest = min(port.delays)
@@ -149,10 +149,10 @@ def _try(rule: Rule, port: RobotPort, topology: Topology) -> tuple[Failure | Non
     def gather(tick: int) -> None:
         for _, event in cursor.read():
             if event.frame is not None and _in_turn_of_another(event.frame, topology, port.slots):
-                seen.forget(event.frame.data)
+                observed.forget(event.frame.data)
             elif event.what != "sent":
-                seen.take(msgspec.structs.replace(event, tick=event.tick - way))
-        seen.end_tick = tick - way
+                observed.take(msgspec.structs.replace(event, tick=event.tick - way))
+        observed.end_tick = tick - way
 
     port.play(sent, gather)
     gather(port.tick)
@@ -160,22 +160,24 @@ def _try(rule: Rule, port: RobotPort, topology: Topology) -> tuple[Failure | Non
 
     for one in script.expected:  # what power-on did is told by now
         if one.by_answers and slot in one.slots and "of power-on" not in one.wanted:
-            if (what := one.found(seen)) is not None:
+            if (what := one.found(observed)) is not None:
                 return Failure("conforms_to", 0, slot, what[0], one.wanted, what[1]), unsure
     return None, unsure
 
 
 def _in_turn_of_another(frame: Received, topology: Topology, there: Sequence[int]) -> bool:
     """Whether another robot at the port may say this."""
-    said = answer_of(frame)
+    answer = answer_of(frame)
     others = (slot for slot in there if slot not in topology.slots)
-    return said is not None and said.slot in others and said.slot == said.seq % topology.robots
+    return answer is not None and answer.slot in others and answer.slot == answer.seq % topology.robots
 
 
-def _whole(said: Sequence[Transmission]) -> list[Transmission]:
+def _whole(transmissions: Sequence[Transmission]) -> list[Transmission]:
     """Transmissions that follow each other without a pause as one: a PC sends them in one piece."""
-    found: list[Transmission] = []
-    for one in sorted(said, key=lambda one: one.tick):
-        both = joined(found[-1], one) if found and found[-1].end_tick == one.tick else None
-        found[-1 if both else len(found) :] = [both or one]
-    return found
+    pieces: list[Transmission] = []
+    for transmission in sorted(transmissions, key=lambda transmission: transmission.tick):
+        both = (
+            joined(pieces[-1], transmission) if pieces and pieces[-1].end_tick == transmission.tick else None
+        )
+        pieces[-1 if both else len(pieces) :] = [both or transmission]
+    return pieces

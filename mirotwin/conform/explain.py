@@ -40,34 +40,34 @@ def explain(rule: Rule, image: Image, seed: int = 0) -> tuple[list[str], int, in
         verdicts = [_verdict(one, listener.observed) for one in trial.expected_of(subject)]
         bad = len([row for row in verdicts if row[1] == "FAILED"])
         board = subject.robot.board
-        told = [(fault.tick, "fault", str(fault)) for fault in board.faults]
+        fault_rows = [(fault.tick, "fault", str(fault)) for fault in board.faults]
         failed, faults = failed + bad, faults + board.fault_count
         summary = amount(len(verdicts), "expectation") + (f", {bad} failed" if bad else " passed")
         lines += ["", f"net{subject.network}/robot{subject.slot} (N = {subject.robots}): {summary}"]
-        rows = sorted([*_rows(listener.observed), *told, *verdicts], key=lambda row: row[0])
+        rows = sorted([*_rows(listener.observed), *fault_rows, *verdicts], key=lambda row: row[0])
         lines += map(_line, _collapsed(rows))
     return lines, failed, faults
 
 
 def _line(row: Row) -> str:
-    tick, what, text = row
-    return f"{tick:>10} {tick / TICKS_PER_MS:>10.3f} ms  {what:<9} {text}"
+    tick, kind, text = row
+    return f"{tick:>10} {tick / TICKS_PER_MS:>10.3f} ms  {kind:<9} {text}"
 
 
 def _collapsed(rows: list[Row]) -> Iterator[Row]:
     """Joins equal rows that follow each other into one row with their number."""
-    for (what, text), group in groupby(rows, key=lambda row: row[1:]):
+    for (kind, text), group in groupby(rows, key=lambda row: row[1:]):
         same = list(group)
         more = f" ({len(same)} times, until tick {same[-1][0]})" if len(same) > 1 else ""
-        yield same[0][0], what, text + more
+        yield same[0][0], kind, text + more
 
 
 def _verdict(expected: TrialExpectation, observed: Observed) -> Row:
     """An expectation that failed stands where it failed, one that was fulfilled where it was over."""
-    found = expected.found(observed)
-    if found is None:
+    failure = expected.found(observed)
+    if failure is None:
         return expected.tick, "passed", expected.wanted
-    return found[0], "FAILED", f"wanted {expected.wanted}, found {found[1]}"
+    return failure[0], "FAILED", f"wanted {expected.wanted}, found {failure[1]}"
 
 
 def _rows(observed: Observed) -> Iterator[Row]:
@@ -82,17 +82,17 @@ def _rows(observed: Observed) -> Iterator[Row]:
             yield event.tick, "commanded", _command(event, orders)
         elif event.what in ("reset", "power"):
             yield event.tick, event.what, f"{event.value}"
-    for what, told in (("received", "received"), ("heard", "answered")):
-        left: Sequence[Event] = [event for event in observed.events if event.what == what]
+    for kind, label in (("received", "received"), ("heard", "answered")):
+        left: Sequence[Event] = [event for event in observed.events if event.what == kind]
         while left:
             run = in_a_row(left)
             left = left[len(run) :]
-            yield run[-1].tick, told, _characters(run) + (_answer(run, observed) if what == "heard" else "")
+            yield run[-1].tick, label, _characters(run) + (_answer(run, observed) if kind == "heard" else "")
 
 
 def _sent(event: Event, decoder: Decoder, observed: Observed) -> str:
-    found = decoder.hear(Transmission(event.tick, DOWN, event.data, event.network))
-    frames = [_frame(one, observed) for one in found if isinstance(one, Received)]
+    receptions = decoder.hear(Transmission(event.tick, DOWN, event.data, event.network))
+    frames = [_frame(one, observed) for one in receptions if isinstance(one, Received)]
     return ": ".join(filter(None, [event.data.hex(" "), "; ".join(frames)]))
 
 
@@ -121,11 +121,11 @@ def _characters(run: Sequence[Event]) -> str:
 def _answer(run: Sequence[Event], observed: Observed) -> str:
     """What the characters say, if they are an answer."""
     for answer in within(observed.answers, run[0].tick, run[-1].tick):
-        said = answer.said
-        if said is None:
+        content = answer.said
+        if content is None:
             return ": an answer with unknown contents"
         return (
-            f": {describe(said)} status={said.status_left:02X}h,{said.status_right:02X}h"
-            f" position={number(said.position_left)}, {number(said.position_right)}"
+            f": {describe(content)} status={content.status_left:02X}h,{content.status_right:02X}h"
+            f" position={number(content.position_left)}, {number(content.position_right)}"
         )
     return ": no answer"

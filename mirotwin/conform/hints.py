@@ -42,31 +42,31 @@ def payload_of(words: Iterable[Pair]) -> bytes:
     return b"".join(word.to_bytes(2, "little", signed=True) for pair in words for word in pair)
 
 
-def wheels_instead(told: Sequence[Order], frame: Frame, slot: int) -> str:
+def wheels_instead(orders: Sequence[Order], frame: Frame, slot: int) -> str:
     """The one mistake that makes both orders of this frame; or ""."""
-    found = (told[0].velocity, told[1].velocity)
+    velocities = (orders[0].velocity, orders[1].velocity)
     left, right = frame.for_robot(slot)
     wanted = (left << 8, right << 8)
     at_limit = max(map(abs, frame.words[slot])) >= VELOCITY_SATURATION  # where one mistake looks like another
-    if at_limit or any(order.what != "drive" for order in told) or found == wanted:
+    if at_limit or any(order.what != "drive" for order in orders) or velocities == wanted:
         return ""
-    for what, pair in _mistakes(frame, slot):
+    for mistake, pair in _mistakes(frame, slot):
         # firmware may cut off before or after its mistake
         for one, other in (pair, (saturated(pair[0]), saturated(pair[1]))):
-            if (one << 8, other << 8) == found:
-                return what
+            if (one << 8, other << 8) == velocities:
+                return mistake
     for shift in _SHIFTS:
-        if found == (wanted[0] << shift, wanted[1] << shift):
+        if velocities == (wanted[0] << shift, wanted[1] << shift):
             return f"{1 << shift} times as fast"
-        if all(_is_slower(*ends, shift) for ends in zip(found, wanted, strict=True)):
+        if all(_is_slower(*ends, shift) for ends in zip(velocities, wanted, strict=True)):
             return f"{1 << shift} times as slow"
     return ""
 
 
-def _is_slower(found: int, wanted: int, shift: int) -> bool:
+def _is_slower(velocity: int, wanted: int, shift: int) -> bool:
     """By a power of two, exactly or as a number that was shifted as the radio carries it and is not all gone."""
-    off = abs((found << shift) - wanted)
-    return (off == 0 and found != 0) or (off < 256 << shift and abs(found) >= _PLAIN)
+    off = abs((velocity << shift) - wanted)
+    return (off == 0 and velocity != 0) or (off < 256 << shift and abs(velocity) >= _PLAIN)
 
 
 def _mistakes(frame: Frame, slot: int) -> Iterator[tuple[str, Pair]]:
@@ -81,16 +81,19 @@ def _mistakes(frame: Frame, slot: int) -> Iterator[tuple[str, Pair]]:
     yield "the test of the sign is the wrong way round", (_wrong_way(left), _wrong_way(right))
     yield "the low bytes are lost", (left & ~0xFF, right & ~0xFF)
     yield "the low bits are lost", (left & ~1, right & ~1)
-    for what, high in (("low", 0), ("high", 8)):
-        yield f"they are the {what} bytes alone", (left >> high & 0xFF, right >> high & 0xFF)
-        yield f"they are the {what} bytes alone, with sign", (_signed(left >> high), _signed(right >> high))
+    for which, high in (("low", 0), ("high", 8)):
+        yield f"they are the {which} bytes alone", (left >> high & 0xFF, right >> high & 0xFF)
+        yield f"they are the {which} bytes alone, with sign", (_signed(left >> high), _signed(right >> high))
     yield "they are taken as numbers without sign", (left & 0xFFFF, right & 0xFFFF)
     for other, pair in enumerate(frame.words):
         yield f"these are the velocities of robot {other}", pair
     payload = payload_of(frame.words)
-    for at in range(len(payload) - 3):
-        pair = (_word(payload, at), _word(payload, at + 2))
-        yield f"these are bytes {at} to {at + 3} of the payload and not {4 * slot} to {4 * slot + 3}", pair
+    for offset in range(len(payload) - 3):
+        pair = (_word(payload, offset), _word(payload, offset + 2))
+        yield (
+            f"these are bytes {offset} to {offset + 3} of the payload and not {4 * slot} to {4 * slot + 3}",
+            pair,
+        )
     if frame.before:
         yield "these are the velocities of the frame before", frame.before[slot]
 
@@ -100,8 +103,8 @@ def _wrong_way(word: int) -> int:
     return -(-word & 0xFFFF) if word > 0 else word & 0xFFFF
 
 
-def _word(payload: bytes, at: int) -> int:
-    return int.from_bytes(payload[at : at + 2], "little", signed=True)
+def _word(payload: bytes, offset: int) -> int:
+    return int.from_bytes(payload[offset : offset + 2], "little", signed=True)
 
 
 def _exchanged(word: int) -> int:
@@ -112,20 +115,20 @@ def _signed(byte: int) -> int:
     return (byte & 0xFF ^ 0x80) - 0x80
 
 
-def characters(heard: Sequence[Event]) -> str:
+def characters(received: Sequence[Event]) -> str:
     """Characters that the PC heard: how many, which, from when to when."""
-    shown = " ".join(f"{one.value:02X}" + ("" if one.good_stop else "!") for one in heard[:24])
-    more = " .." if len(heard) > 24 else ""
-    count = amount(len(heard), "character")
-    return f"{count}, {shown}{more} ({between(heard[0].tick, heard[-1].tick)})"
+    shown = " ".join(f"{one.value:02X}" + ("" if one.good_stop else "!") for one in received[:24])
+    more = " .." if len(received) > 24 else ""
+    count = amount(len(received), "character")
+    return f"{count}, {shown}{more} ({between(received[0].tick, received[-1].tick)})"
 
 
-def in_a_row(heard: Sequence[Event]) -> Sequence[Event]:
+def in_a_row(received: Sequence[Event]) -> Sequence[Event]:
     """The first characters, up to a pause."""
-    for count, (one, other) in enumerate(pairwise(heard), 1):
-        if not follows(one.tick, other.tick):
-            return heard[:count]
-    return heard
+    for count, (character, other) in enumerate(pairwise(received), 1):
+        if not follows(character.tick, other.tick):
+            return received[:count]
+    return received
 
 
 def between(begin_tick: int, end_tick: int) -> str:
@@ -133,22 +136,24 @@ def between(begin_tick: int, end_tick: int) -> str:
     return f"ticks {begin_tick} to {end_tick}, {times}"
 
 
-def no_answer(heard: Sequence[Event], seq: int) -> str:
+def no_answer(received: Sequence[Event], seq: int) -> str:
     """Why these characters are no answer to the question with this number."""
-    data = bytes(one.value for one in heard)
-    at = data.find(SYNC)
-    if at < 0:
+    data = bytes(one.value for one in received)
+    begin = data.find(SYNC)
+    if begin < 0:
         return "no sync 2D D4"
-    found = data[at : at + TELEMETRY.size]
-    if len(found) < TELEMETRY.size:
-        return f"{amount(len(found), 'character')} from the sync on and not {TELEMETRY.size}"
+    window = data[begin : begin + TELEMETRY.size]
+    if len(window) < TELEMETRY.size:
+        return f"{amount(len(window), 'character')} from the sync on and not {TELEMETRY.size}"
     begins = FrameType.TELEMETRY * SEQ_MODULUS + seq
-    mistake = mistake_in(TELEMETRY, found, begins)
+    mistake = mistake_in(TELEMETRY, window, begins)
     if mistake:
         return f"it has {mistake}"
-    if found[len(SYNC)] == begins:
+    if window[len(SYNC)] == begins:
         return f"its HDR {begins:02X}h is not whitened"
     decoder = TelemetryDecoder()
-    events = decoder.feed_symbols([(one.value, one.good_stop, one.tick) for one in heard]) + decoder.flush()
+    events = (
+        decoder.feed_symbols([(one.value, one.good_stop, one.tick) for one in received]) + decoder.flush()
+    )
     reasons = [event.reason for event in events if isinstance(event, Damaged)]
     return max(reasons).name.lower().replace("_", " ") if reasons else ""

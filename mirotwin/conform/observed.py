@@ -72,11 +72,11 @@ class Observed:
             self.heard.append(event)
         elif event.what == "answer" and event.frame is not None:
             try:
-                said = event.frame.message(self.robots)
+                content = event.frame.message(self.robots)
             except ContentError:
-                said = None
-            assert said is None or isinstance(said, TelemetryFrame)
-            self.answers.append(ReceivedAnswer(event.tick, event.frame, said))
+                content = None
+            assert content is None or isinstance(content, TelemetryFrame)
+            self.answers.append(ReceivedAnswer(event.tick, event.frame, content))
 
     def forget(self, data: bytes) -> None:
         """Removes the last reception of these characters: another robot sent them."""
@@ -121,8 +121,8 @@ class Observed:
 
     def ordered(self, after_tick: int, until_tick: int) -> Iterator[Order]:
         """The orders to either wheel in between, in the order of time."""
-        found = [order for side in SIDES for order in within(self.orders[side], after_tick, until_tick)]
-        yield from sorted(found, key=lambda order: order.tick)
+        orders = [order for side in SIDES for order in within(self.orders[side], after_tick, until_tick)]
+        yield from sorted(orders, key=lambda order: order.tick)
 
     def wrote(self, after_tick: int, until_tick: int) -> list[Event]:
         """The commands in between that do more than read."""
@@ -140,8 +140,8 @@ class Observed:
 
     def set_to(self, side: str, tick: int) -> Words | None:
         """The filter words in force at `tick`, None before the first."""
-        found = [words for taken_tick, words in self.filters[side] if taken_tick <= tick]
-        return found[-1] if found else None
+        words_taken = [words for taken_tick, words in self.filters[side] if taken_tick <= tick]
+        return words_taken[-1] if words_taken else None
 
     def chips(self, after_tick: int, until_tick: int) -> Iterator[tuple[int, str, Axis]]:
         """Tick, side and state of both chips at the start of each control period in between."""

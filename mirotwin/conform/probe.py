@@ -47,17 +47,17 @@ _UNHEARD = 4
 def why_deaf(network: int, image: Image, seed: int) -> str:
     """What the robot in this one of `BOTH` does instead of obeying plain frames, or ""."""
     topology = BOTH[network]
-    said: list[tuple[str, Frame]] = []
+    tried: list[tuple[str, Frame]] = []
 
     def ways(script: TrialScript) -> None:
         script.wait(_SETTLING_MS)
-        said.append(("", script.team()))
+        tried.append(("", script.team()))
         body = bytes(script.form.body_size)
-        for what, sealing in MISTAKES.items():
+        for mistake, sealing in MISTAKES.items():
             if sealing.seal(script.form, body) != seal(script.form, body):
-                said.append((f"frames with {what}", script.team(sealed=sealing.seal)))
+                tried.append((f"frames with {mistake}", script.team(sealed=sealing.seal)))
         other = _other_layout(script)
-        said.append((f"frames for {other.n} robots: its strap for N is read the other way", other.team()))
+        tried.append((f"frames for {other.n} robots: its strap for N is read the other way", other.team()))
         script.said += other.said
         script.wait_until(other.now)
         script.expects(script.now, "")(lambda observed: iter(()))
@@ -66,9 +66,9 @@ def why_deaf(network: int, image: Image, seed: int) -> str:
     (listener,) = listen(trial_of(rule), image, seed)
     # the earliest link of the chain first: a mistake in one makes all after it look wrong
     return (
-        _serial_port(listener.observed.events, said[0][1])
+        _serial_port(listener.observed.events, tried[0][1])
         or _begins_again(listener)
-        or _obeyed(listener.observed, said)
+        or _obeyed(listener.observed, tried)
         or _chips(listener)
     )
 
@@ -109,8 +109,8 @@ def why_lost(rule: Rule, network: int, image: Image, seed: int) -> str:
     trial = trial_of(rule)
     if rule.topologies[network].keyed or not all(isinstance(one, Transmission) for one in trial.script):
         return ""  # noise, or a robot that was off
-    said = trial.transmissions_of(network)
-    sent = len(b"".join(one.data for one in said))
+    transmissions = trial.transmissions_of(network)
+    sent = len(b"".join(one.data for one in transmissions))
     for listener in listen(trial, image, seed):
         if listener.subject.network == network:
             received = [one for one in listener.observed.events if one.what == "received"]
@@ -121,19 +121,19 @@ def why_lost(rule: Rule, network: int, image: Image, seed: int) -> str:
             if again := _begins_again(listener):
                 return again
             last_tick = max((one.tick for one in listener.observed.commands), default=0)
-            later = [one for one in said if one.tick > last_tick]
+            later = [one for one in transmissions if one.tick > last_tick]
             if last_tick and len(later) > _UNHEARD:
                 when = f"{last_tick / TICKS_PER_MS:.0f} ms"
                 return f"it does nothing after {when}, though {len(later)} frames follow: it hangs"
     return ""
 
 
-def _obeyed(observed: Observed, said: Sequence[tuple[str, Frame]]) -> str:
-    for what, frame in said[1:]:
+def _obeyed(observed: Observed, tried: Sequence[tuple[str, Frame]]) -> str:
+    for mistake, frame in tried[1:]:
         if observed.slot < len(frame.words) and all(
             map(obeys, observed.both_told(frame.acted_tick), frame.for_robot(observed.slot))
         ):
-            return f"it obeys {what}"
+            return f"it obeys {mistake}"
     return ""
 
 

@@ -81,8 +81,8 @@ class RuleMonitor(ObservingMonitor[ConformsTo]):
     def event(self, event: Event) -> None:
         super().event(event)
         if event.what == "sent":
-            said = self.remaining.pop() if self.remaining else None
-            if said is None or (said.tick, said.data) != (event.tick, event.data):
+            scripted = self.remaining.pop() if self.remaining else None
+            if scripted is None or (scripted.tick, scripted.data) != (event.tick, event.data):
                 self.off_script = True
 
     def fault(self, fault: FirmwareFault) -> None:
@@ -97,6 +97,8 @@ class RuleMonitor(ObservingMonitor[ConformsTo]):
             return
         judged = [one for one in self.trial.expected_of(self.subject) if one.tick < tick]
         self.judged += len(judged)
-        found = [(one.wanted, *what) for one in judged if (what := one.found(self.observed)) is not None]
-        for wanted, at, text in sorted(found, key=itemgetter(1)):
-            self.fail(at, wanted, text)
+        failures = [
+            (one.wanted, *failure) for one in judged if (failure := one.found(self.observed)) is not None
+        ]
+        for wanted, failed_tick, text in sorted(failures, key=itemgetter(1)):
+            self.fail(failed_tick, wanted, text)

@@ -91,11 +91,11 @@ def try_rule(rule: Rule, image: Image, seed: int = 0, keep: bool = False) -> Out
     )
     if not failures and (not world.finished or run.verdict_on("conforms_to") != "passed"):
         wanted = "a trial that can be judged"
-        found = (
+        reason = (
             "more events than the robot's log holds" if world.finished else f"{MOST_FAULTS} firmware faults"
         )
         first = world.robots[0]
-        failures = [Failure("conforms_to", first.network, first.slot, world.tick, wanted, found)]
+        failures = [Failure("conforms_to", first.network, first.slot, world.tick, wanted, reason)]
     cases = _cases(rule, run, failures, faults) if keep else ()
     return Outcome(rule.id, tuple(failures), faults, fault_count(world), cases)
 
@@ -108,14 +108,14 @@ def _cases(
 ) -> tuple[tuple[str, str], ...]:
     """Each of which `mirotwin replay` brings to the same verdict."""
     own, of_fault = case_names(rule)
-    found = []
+    cases = []
     if failures and run.world.finished:
-        found.append((own, run.stream({"conforms_to": rule.id}, str(failures[0]))))
+        cases.append((own, run.stream({"conforms_to": rule.id}, str(failures[0]))))
     if faults:
         first = min(faults, key=lambda one: one[2].tick)
         verdict = _of_fault("no_fault", NoFault.WANTED, *first)
-        found.append((of_fault, run.stream({"no_fault": True}, str(verdict))))
-    return tuple(found)
+        cases.append((of_fault, run.stream({"no_fault": True}, str(verdict))))
+    return tuple(cases)
 
 
 def _of_fault(check: str, wanted: str, network: int, slot: int, fault: FirmwareFault) -> Failure:
@@ -187,7 +187,7 @@ def in_order(rules: Sequence[Rule], tried: Callable[[Rule], Outcome]) -> Iterato
 def with_faults(outcomes: Sequence[Outcome], rules: Sequence[Rule]) -> list[Outcome]:
     """The outcomes in the order of `rules`, with all trials' firmware faults held against those that forbid them."""
     by_id = {outcome.rule: outcome for outcome in outcomes}
-    found = []
+    judged = []
     for rule in rules:
         if rule.id in by_id:  # else a port was lost before
             forbidden = [
@@ -199,5 +199,5 @@ def with_faults(outcomes: Sequence[Outcome], rules: Sequence[Rule]) -> list[Outc
             outcome = by_id[rule.id]
             cause = "" if forbidden else outcome.cause
             failures = (*forbidden, *outcome.failures)
-            found.append(msgspec.structs.replace(outcome, failures=failures, cause=cause))
-    return found
+            judged.append(msgspec.structs.replace(outcome, failures=failures, cause=cause))
+    return judged

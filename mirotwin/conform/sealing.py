@@ -117,8 +117,8 @@ good refuses the numbers that follow."""
 
 def mistake_in(form: Format, characters: bytes, begins: int) -> str:
     """The mistake with which these characters, from the sync on, are a frame whose HDR is `begins`; or ""."""
-    for what, sealing in MISTAKES.items():
+    for mistake, sealing in MISTAKES.items():
         body = sealing.opened(form, characters)
         if body is not None and body[0] == begins:
-            return what
+            return mistake
     return ""

@@ -275,12 +275,12 @@ class TrialScript:
 
         @self.expects(frame.acted_tick, f"the wheels told as by {frame.what} within {ACTING_MS:g} ms")
         def test(observed: Observed) -> Found:
-            told = observed.both_told(frame.acted_tick)
+            orders = observed.both_told(frame.acted_tick)
             wanted = frame.for_robot(observed.slot)
-            if not all(map(obeys, told, wanted)):
+            if not all(map(obeys, orders, wanted)):
                 left, right = map(number, wanted)
-                found = f"{in_words(told[0])}, {in_words(told[1])} and not {left}, {right}"
-                yield frame.acted_tick, found + _instead(observed, frame, told)
+                reason = f"{in_words(orders[0])}, {in_words(orders[1])} and not {left}, {right}"
+                yield frame.acted_tick, reason + _instead(observed, frame, orders)
 
         return frame
 
@@ -304,10 +304,10 @@ class TrialScript:
         @self.expects(frame.acted_tick, f"{frame.what} not acted on", slots)
         def test(observed: Observed) -> Found:
             for event in observed.wrote(frame.tick, frame.acted_tick):
-                found = str(event).partition(" command ")[2]
+                text = str(event).partition(" command ")[2]
                 if since is not None and abs(event.tick - since.end_tick - FAILSAFE_STOP_TICKS) <= ms(2.0):
-                    found += f": the failsafe counts on from {since.what}"
-                yield event.tick, found
+                    text += f": the failsafe counts on from {since.what}"
+                yield event.tick, text
 
     def answered(self, question: Frame, wanted: str = "", says: Says | None = None) -> None:
         """The robot that it asks answers in time, and with this number."""
@@ -316,35 +316,35 @@ class TrialScript:
         @self.expects(deadline, wanted or f"an answer to {question.what}", (slot,), by_answers=True)
         def test(observed: Observed) -> Found:
             answers = within(observed.answers, question.last_tick, deadline)
-            said = answers[0].said if answers else None
+            content = answers[0].said if answers else None
             if not answers:
                 yield deadline, _no_answer(observed, question, deadline)
-            elif said is None or (said.slot, said.seq) != (slot, question.seq):
+            elif content is None or (content.slot, content.seq) != (slot, question.seq):
                 yield answers[0].tick, who(answers[0])
-            elif says is not None and (what := says(said, answers[0], observed)):
-                yield answers[0].tick, what
+            elif says is not None and (reason := says(content, answers[0], observed)):
+                yield answers[0].tick, reason
 
     def silent(self, after_tick: int, until_tick: int, why: str) -> None:
         """The PC hears nothing in between."""
 
         @self.expects(until_tick, f"silence: {why}", by_answers=True)
         def test(observed: Observed) -> Found:
-            if heard := in_a_row(within(observed.heard, after_tick, until_tick)):
-                answers = within(observed.answers, heard[0].tick, heard[-1].tick)
-                yield heard[0].tick, ": ".join([characters(heard), *map(who, answers[:1])])
+            if received := in_a_row(within(observed.heard, after_tick, until_tick)):
+                answers = within(observed.answers, received[0].tick, received[-1].tick)
+                yield received[0].tick, ": ".join([characters(received), *map(who, answers[:1])])
 
 
-def _instead(observed: Observed, frame: Frame, told: tuple[Order, Order]) -> str:
+def _instead(observed: Observed, frame: Frame, orders: tuple[Order, Order]) -> str:
     """What the robot made of the frame, where that is plain; else ""."""
-    if max(order.tick for order in told) <= frame.tick:
+    if max(order.tick for order in orders) <= frame.tick:
         late = _told_late(observed, frame)
         if late is not None:
             return f": told so {(late - frame.end_tick) / TICKS_PER_MS:.2f} ms after its end"
         wrote = observed.wrote(frame.tick, frame.acted_tick)
         loaded = any(one.opcode == _LTRJ and one.data[1:2] and one.data[1] & _VELOCITY for one in wrote)
         return ": loaded, but not started (STT)" if loaded else ": nothing was told"
-    what = wheels_instead(told, frame, observed.slot)
-    return f": {what}" if what else ""
+    mistake = wheels_instead(orders, frame, observed.slot)
+    return f": {mistake}" if mistake else ""
 
 
 def _told_late(observed: Observed, frame: Frame) -> int | None:
@@ -357,20 +357,24 @@ def _told_late(observed: Observed, frame: Frame) -> int | None:
 
 def who(answer: ReceivedAnswer) -> str:
     """Who says it, for people."""
-    said = answer.said
-    return "unknown contents" if said is None else f"an answer of robot {said.slot} to question {said.seq}"
+    content = answer.said
+    return (
+        "unknown contents"
+        if content is None
+        else f"an answer of robot {content.slot} to question {content.seq}"
+    )
 
 
 def _no_answer(observed: Observed, question: Frame, deadline: int) -> str:
-    heard = within(observed.heard, question.last_tick, deadline)
+    received = within(observed.heard, question.last_tick, deadline)
     later = within(observed.answers, deadline, observed.end_tick)
     late = next((one for one in later if one.frame.seq == question.seq), None)
     if late is not None and late.frame.start_tick < deadline + CONTROL_PERIOD_TICKS:
         return f"one that is over {(late.tick - question.end_tick) / TICKS_PER_MS:.2f} ms after the question's end"
-    if not heard:
+    if not received:
         return "no answer"
-    why = no_answer(heard, question.seq)
-    return f"{characters(heard)}: {why}" if why else f"{characters(heard)}, which are no answer"
+    why = no_answer(received, question.seq)
+    return f"{characters(received)}: {why}" if why else f"{characters(received)}, which are no answer"
 
 
 def ms(time_ms: float) -> int:

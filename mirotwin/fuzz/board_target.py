@@ -162,8 +162,8 @@ class BoardTarget(Target):
             return TargetFailure(NO_FAULT, fault.tick, fault.pc, str(fault))
         if self.code == NEVER_SLEEPS_CODE:
             where = self.image.symbols.name_at(self.cpu.pc)
-            what = f"awake long after the last character{f', in {where}' if where else ''}"
-            return TargetFailure(NEVER_SLEEPS, self.end_tick(), 0, what)
+            reason = f"awake long after the last character{f', in {where}' if where else ''}"
+            return TargetFailure(NEVER_SLEEPS, self.end_tick(), 0, reason)
         if self.code == CHECK_CODE and self._wrong is not None:
             return TargetFailure(self._wrong.check, self.end_tick(), 0, self._wrong.what)
         return None
@@ -171,12 +171,12 @@ class BoardTarget(Target):
     def describe(self, data: bytes) -> str:
         return "\n".join(self._line(one) for one in self.script(data))
 
-    def _line(self, one: ScriptItem) -> str:
+    def _line(self, item: ScriptItem) -> str:
         protocol = self.protocol
-        if protocol is None or not isinstance(one, Transmission):
-            return described(one)
-        said = asked(protocol.decode, lambda: [shown(part) for part in protocol.decode(one.data)])
-        return f"{described(one)}  # {'; '.join(said)}"
+        if protocol is None or not isinstance(item, Transmission):
+            return described(item)
+        parts = asked(protocol.decode, lambda: [shown(part) for part in protocol.decode(item.data)])
+        return f"{described(item)}  # {'; '.join(parts)}"
 
     def seeds(self) -> list[bytes]:
         """Inputs to begin with: the protocol's samples, one by one and all together."""
@@ -198,16 +198,16 @@ class BoardTarget(Target):
 
 def _refuse_unseen(check: Check, subject: Subject) -> None:
     """Raises BadInput for a check that wants to see more than characters and memories."""
-    unseen = [what for what in checked_monitor(check, subject).EVENTS if what not in _SEEN]
+    unseen = [reason for reason in checked_monitor(check, subject).EVENTS if reason not in _SEEN]
     if unseen:
-        what = f"{check.name} judges by {', '.join(unseen)}, which only a whole run shows"
-        raise BadInput("", "--expect-all", what, "leave it out: each input that is new is judged so")
+        reason = f"{check.name} judges by {', '.join(unseen)}, which only a whole run shows"
+        raise BadInput("", "--expect-all", reason, "leave it out: each input that is new is judged so")
 
 
 def frame_input(body: bytes, input: str) -> bytes:
     """The input that sends one body; of a class other than `bytes`, which has none."""
-    kept = body[:MOST_OF_A_BODY] or b"\0"
-    return (b"\x07" if input == "session" else b"") + bytes([len(kept) - 1]) + kept
+    content = body[:MOST_OF_A_BODY] or b"\0"
+    return (b"\x07" if input == "session" else b"") + bytes([len(content) - 1]) + content
 
 
 def board_target(spec: TargetSpec) -> BoardTarget:

@@ -183,10 +183,10 @@ class Campaign:
         began_s = time.monotonic()
         try:
             self.judged += 1
-            found = self.triage.oracle.judged(data, self.expected)
-            failure = found.failure
+            run = self.triage.oracle.judged(data, self.expected)
+            failure = run.failure
             for name in self.expected:
-                self.verdicts[name].add(found.verdict_on(name))
+                self.verdicts[name].add(run.verdict_on(name))
             if failure is not None:
                 self._keep(self.triage.take_judged(data, failure, self.expected))
         finally:

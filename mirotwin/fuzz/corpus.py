@@ -40,9 +40,9 @@ def read_corpus(folder: Path, kind: str, robots: int) -> tuple[list[bytes], list
     Raises BadInput where there are none.
     """
     if not folder.is_dir():
-        what = "is no folder" if folder.exists() else "there is no such folder"
-        raise BadInput(folder, OPTION, what, "name a folder of .stream, .mcap or input files")
-    found: dict[bytes, None] = {}
+        reason = "is no folder" if folder.exists() else "there is no such folder"
+        raise BadInput(folder, OPTION, reason, "name a folder of .stream, .mcap or input files")
+    inputs: dict[bytes, None] = {}
     foreign: list[str] = []
     notes: list[str] = []
     files = list(_files(folder))
@@ -53,10 +53,10 @@ def read_corpus(folder: Path, kind: str, robots: int) -> tuple[list[bytes], list
             notes.append(f"{OPTION}: passed over: {error}")
             continue
         if taken:
-            found.update(dict.fromkeys(taken))
+            inputs.update(dict.fromkeys(taken))
         else:
             foreign.append(path.name)
-    if not found:
+    if not inputs:
         held = f"no input among {amount(len(files), 'file')}" if files else "holds no file"
         more = f" ({notes[0].removeprefix(f'{OPTION}: passed over: ')})" if notes else ""
         remedy = "put .stream or .mcap files, or inputs of an earlier campaign there, or leave --corpus out"
@@ -65,9 +65,9 @@ def read_corpus(folder: Path, kind: str, robots: int) -> tuple[list[bytes], list
         names = ", ".join(foreign[:_NAMED]) + (", .." if len(foreign) > _NAMED else "")
         files_text = amount(len(foreign), "file that is no input", "files that are no inputs")
         notes.append(f"{OPTION} {folder}: passed over {files_text}: {names}")
-    if len(found) > MOST:
-        notes.append(f"{OPTION} {folder}: {len(found)} inputs, of which the first {MOST} are taken")
-    return list(found)[:MOST], notes
+    if len(inputs) > MOST:
+        notes.append(f"{OPTION} {folder}: {len(inputs)} inputs, of which the first {MOST} are taken")
+    return list(inputs)[:MOST], notes
 
 
 def _files(folder: Path) -> Iterator[Path]:
@@ -83,8 +83,8 @@ def _inputs_in(path: Path, kind: str, robots: int) -> list[bytes]:
         format, _ = detect(given.peek())
         if format in TIMED:
             by_network: dict[int, list[ScriptItem]] = {}
-            for one in _heard(given, format):
-                by_network.setdefault(one.network, []).append(one)
+            for item in _heard(given, format):
+                by_network.setdefault(item.network, []).append(item)
             return [data for sent in by_network.values() for data in inputs_of(kind, sent, robots)]
     if path.suffix.lower() in FOREIGN or not 0 < path.stat().st_size <= INPUT_BYTES:
         return []

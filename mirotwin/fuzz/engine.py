@@ -95,9 +95,9 @@ class Explorer:
     def run(self, data: bytes) -> int:
         """Returns how many edges it executed."""
         self._edges[:] = self._none
-        found = self.target.run(data)
+        failed = self.target.run(data)
         classes = int.from_bytes(self._edges.translate(_CLASSES), "little")
-        failure = self.target.failure if found else None
+        failure = self.target.failure if failed else None
         if failure is not None:
             if (failure.check, failure.pc) not in self.failures:
                 self.failures[failure.check, failure.pc] = None
@@ -110,8 +110,8 @@ class Explorer:
     @property
     def edges(self) -> int:
         """Seen, in runs without a failure."""
-        seen = self.seen.to_bytes(len(self._edges), "little")
-        return len(seen) - seen.count(0)
+        counts = self.seen.to_bytes(len(self._edges), "little")
+        return len(counts) - counts.count(0)
 
 
 def _class_of(count: int) -> int:
@@ -216,9 +216,9 @@ class Engine:
 
     def _new(self, kind: str) -> list[Path]:
         self._require_health()
-        found = [path for path in self._inputs(kind) if path not in self._handed_out and _content(path)]
-        self._handed_out.update(dict.fromkeys(found))
-        return found
+        paths = [path for path in self._inputs(kind) if path not in self._handed_out and _content(path)]
+        self._handed_out.update(dict.fromkeys(paths))
+        return paths
 
     def _inputs(self, kind: str) -> list[Path]:
         """All that its jobs have left in `queue` or `crashes`, without those that one took over from another."""

@@ -65,8 +65,8 @@ class CampaignFolder:
             remedy = f"choose another with {OPTION}, or replace an earlier campaign with --force"
             raise not_empty(self.path, present, remedy)
         if others:
-            what = f"holds what no campaign leaves ({some(others)})"
-            raise OutputError(self.path, what, f"choose another folder with {OPTION}")
+            reason = f"holds what no campaign leaves ({some(others)})"
+            raise OutputError(self.path, reason, f"choose another folder with {OPTION}")
         return present
 
     def _empty(self) -> None:
@@ -135,5 +135,5 @@ def unused(path: Path) -> Path:
 def check_outside(path: Path, corpus: Path | None) -> None:
     """Refuses a corpus that the campaign would take away. Raises BadInput."""
     if corpus is not None and path.exists() and corpus.resolve().is_relative_to(path.resolve()):
-        what = f"lies in {path}, which the campaign replaces"
-        raise BadInput(corpus, "--corpus", what, f"choose another folder with {OPTION}")
+        reason = f"lies in {path}, which the campaign replaces"
+        raise BadInput(corpus, "--corpus", reason, f"choose another folder with {OPTION}")

@@ -183,8 +183,8 @@ def fuzz(options: FuzzOptions) -> int:
     firmware = load_firmware(options.image, SPACE_BYTES if options.bare else FLASH_BYTES)
     robots = int(options.robots)
     if options.slot >= robots:
-        what = f"--slot {options.slot} does not exist among {robots} robots"
-        raise click.UsageError(f"{what}; give 0 to {robots - 1}.")
+        reason = f"--slot {options.slot} does not exist among {robots} robots"
+        raise click.UsageError(f"{reason}; give 0 to {robots - 1}.")
     parameters = {"crystal_hz": options.crystal, "boot_ms": options.boot_ms}
     spec = TargetSpec(
         board="bare" if options.bare else "miro",
@@ -213,15 +213,15 @@ def _campaign(spec: TargetSpec, image: Image, options: FuzzOptions, expected: di
     oracle = oracle_of(target, expected)
     inputs = dict.fromkeys(filter(None, target.seeds()))
     if options.corpus is not None:
-        found, notes = read_corpus(options.corpus, spec.input, spec.robots)
-        inputs |= dict.fromkeys(found)
+        taken, notes = read_corpus(options.corpus, spec.input, spec.robots)
+        inputs |= dict.fromkeys(taken)
         for note in notes:
             complain(note)
     _check_at_rest(target, image, options.crystal or TICKS_PER_SECOND)
     reached = InputCoverage(image, lambda: make_target(spec))
     if covering is not None and covering.address in reached.total:
-        what = f"{covering.name} runs while the firmware starts, before any input"
-        raise BadInput("", "--covering", what, "name a function that an input has to reach")
+        reason = f"{covering.name} runs while the firmware starts, before any input"
+        raise BadInput("", "--covering", reason, "name a function that an input has to reach")
     triage = Triage(reached, oracle, folder, source_folders(image, options.sources), options.minimise_s)
     with folder.filled():
         failing, passing, silent = _sorted_out(target, inputs)
@@ -307,8 +307,8 @@ class FuzzProgress(ProgressBar):
 
     PATIENCE_S = 0.0
 
-    def __init__(self, what: str, time_s: float, quiet: bool) -> None:
-        super().__init__(f"fuzzing {what}", time_s, quiet)
+    def __init__(self, subject: str, time_s: float, quiet: bool) -> None:
+        super().__init__(f"fuzzing {subject}", time_s, quiet)
         self._time_s = time_s
         self._quiet = quiet
         self._line_s = time.monotonic()
@@ -379,5 +379,5 @@ def _check_at_rest(target: Target, image: Image, crystal_hz: int) -> None:
         why = "inputs are characters of 8 without a pause, which it reads as others"
         complain(f"{image.path}: takes characters of 9 bits; {why}")
     if failure is not None:
-        what = f"fails before it has heard anything: {failure.check}: {failure.what}"
-        raise BadInput(image.path, "", what, "mend that first: each input would find it")
+        reason = f"fails before it has heard anything: {failure.check}: {failure.what}"
+        raise BadInput(image.path, "", reason, "mend that first: each input would find it")

@@ -47,13 +47,15 @@ class HypothesisRun(Engine):
             name = f"job{number}"
             for kind in ("queue", "crashes"):
                 (given.out / name / kind).mkdir(parents=True, exist_ok=True)
-            what = [given.target, str(given.seeds), str(given.out / name), str(seed + number)]
-            self.jobs.append(Job(given.out, name, python_module("mirotwin.fuzz.hypothesis_process", *what)))
+            arguments = [given.target, str(given.seeds), str(given.out / name), str(seed + number)]
+            self.jobs.append(
+                Job(given.out, name, python_module("mirotwin.fuzz.hypothesis_process", *arguments))
+            )
 
     def _why_ended(self, job: Job) -> BadInput:
         lines = job.log.read_text("utf-8", "replace").strip().splitlines()
-        what = lines[-1] if lines else f"ended with exit code {job.process.returncode}"
-        return BadInput("Hypothesis", "", what, f"see {job.log}")
+        reason = lines[-1] if lines else f"ended with exit code {job.process.returncode}"
+        return BadInput("Hypothesis", "", reason, f"see {job.log}")
 
 
 def explore(
@@ -105,12 +107,12 @@ def main(arguments: Sequence[str]) -> int:
     except BadInput as error:
         print(error, file=sys.stderr)
         return 2
-    kept: Counter[str] = Counter()
+    counts: Counter[str] = Counter()
     write, told_s = counter(Path(f"{folder}.counts")), 0.0
 
     def keep(kind: str, data: bytes) -> None:
-        path = Path(folder, kind, f"id:{kept[kind]:06d}")
-        kept[kind] += 1
+        path = Path(folder, kind, f"id:{counts[kind]:06d}")
+        counts[kind] += 1
         replace_file(path, data)
 
     def tell() -> None:

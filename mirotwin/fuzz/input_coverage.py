@@ -64,11 +64,11 @@ class InputCoverage:
 
 def _watched(make: Callable[[], Target], counters: Counters) -> Target:
     """A target whose processor is counted from the moment at which it gets its program until it is there."""
-    seen: list[Cpu] = []
+    watched: list[Cpu] = []
 
     def watch(cpu: Cpu) -> None:
-        if not seen:
-            seen.append(cpu)
+        if not watched:
+            watched.append(cpu)
             attach(cpu, counters)
 
     token = on_load.set(watch)
@@ -76,6 +76,6 @@ def _watched(make: Callable[[], Target], counters: Counters) -> Target:
         target = make()
     finally:
         on_load.reset(token)
-    for cpu in seen:
+    for cpu in watched:
         detach(cpu, counters)
     return target

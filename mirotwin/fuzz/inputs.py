@@ -44,66 +44,66 @@ Frame = tuple[int, bytes]
 
 def inputs_of(kind: str, happened: Iterable[ScriptItem], robots: int) -> list[bytes]:
     """The inputs of that kind that this becomes, at most so many transmissions each, no two the same."""
-    heard = [
+    items = [
         one for one in happened if not isinstance(one, Transmission) or (one.direction == DOWN and one.data)
     ]
-    pieces = [heard[first : first + TOGETHER] for first in range(0, len(heard), TOGETHER)]
+    pieces = [items[first : first + TOGETHER] for first in range(0, len(items), TOGETHER)]
     return list(dict.fromkeys(filter(None, (input_of(kind, piece, robots) for piece in pieces))))
 
 
-def input_of(kind: str, heard: Sequence[ScriptItem], robots: int) -> bytes:
+def input_of(kind: str, items: Sequence[ScriptItem], robots: int) -> bytes:
     """One input of that kind; empty where there is nothing that it could say."""
     if kind == "bytes":
-        return b"".join(one.data for one in heard if isinstance(one, Transmission))
-    found = bytearray()
+        return b"".join(item.data for item in items if isinstance(item, Transmission))
+    data = bytearray()
     last_seq = 0
-    end_tick = heard[0].tick if heard else 0
-    for one in heard:
-        if not isinstance(one, Transmission):
-            if kind == "session" and isinstance(one, Reset) and one.level:
-                found.append(RESET)
+    end_tick = items[0].tick if items else 0
+    for item in items:
+        if not isinstance(item, Transmission):
+            if kind == "session" and isinstance(item, Reset) and item.level:
+                data.append(RESET)
             continue
         if kind == "session":
-            found += _waited(one.tick - end_tick)
-        for part in _parts(one, robots):
+            data += _waited(item.tick - end_tick)
+        for part in _parts(item, robots):
             if isinstance(part, bytes):
-                found += _raw(part) if kind == "session" else b""
+                data += _raw(part) if kind == "session" else b""
                 continue
             seq = part[0] % SEQ_MODULUS
             step = (seq - last_seq) % SEQ_MODULUS
             written = _operation(part, step) if kind == "session" else _frame(part, step)
             if kind != "session" or written[0] != FRAME:
                 last_seq = seq
-            found += written
-        end_tick = one.end_tick
-    return bytes(found)
+            data += written
+        end_tick = item.end_tick
+    return bytes(data)
 
 
 def _waited(ticks: int) -> bytes:
     """Operations that wait so long: silences, then a pause."""
-    found = bytearray()
+    data = bytearray()
     while ticks >= _STEPS * PAUSE_TICKS:
         steps = min(_STEPS, ticks // SILENCE_TICKS)
-        found += bytes([SILENCE, steps - 1])
+        data += bytes([SILENCE, steps - 1])
         ticks -= steps * SILENCE_TICKS
     steps = (ticks + PAUSE_TICKS // 2) // PAUSE_TICKS
     if steps > 0:
-        found += bytes([PAUSE, min(steps, _STEPS) - 1])
-    return bytes(found)
+        data += bytes([PAUSE, min(steps, _STEPS) - 1])
+    return bytes(data)
 
 
-def _parts(one: Transmission, robots: int) -> list[Frame | bytes]:
+def _parts(transmission: Transmission, robots: int) -> list[Frame | bytes]:
     """The frames in a transmission that a target can make, and the characters between them."""
-    found: list[Frame | bytes] = []
-    rest = one.data
-    for event in Decoder(robots).hear(one):
+    parts: list[Frame | bytes] = []
+    rest = transmission.data
+    for event in Decoder(robots).hear(transmission):
         if not isinstance(event, Received) or event.type == FrameType.TELEMETRY:
             continue
         before, here, behind = rest.partition(event.data)
         if here:
-            found += [*([before] if before else []), (event.body[0], event.body[1:])]
+            parts += [*([before] if before else []), (event.body[0], event.body[1:])]
             rest = behind
-    return [*found, *([rest] if rest else [])]
+    return [*parts, *([rest] if rest else [])]
 
 
 def _raw(data: bytes) -> bytes:
@@ -161,21 +161,21 @@ def talks(robots: int, slot: int) -> list[list[Said]]:
 
 def sent(talk: Sequence[Said], robots: int) -> list[Transmission]:
     """A talk as what goes over the air."""
-    found: list[Transmission] = []
+    transmissions: list[Transmission] = []
     end_tick = 0
     for message, silence_ms in talk:
-        found.append(Transmission(end_tick + silence_ms * MS, DOWN, encode(message, robots)))
-        end_tick = found[-1].end_tick
-    return found
+        transmissions.append(Transmission(end_tick + silence_ms * MS, DOWN, encode(message, robots)))
+        end_tick = transmissions[-1].end_tick
+    return transmissions
 
 
 def seeds(kind: str, robots: int, slot: int) -> list[bytes]:
     """The built-in inputs of that kind."""
-    found = [input_of(kind, sent(talk, robots), robots) for talk in talks(robots, slot)]
+    inputs = [input_of(kind, sent(talk, robots), robots) for talk in talks(robots, slot)]
     if kind == "session":
-        found += [one + bytes([SILENCE, 39]) for one in found[:1]]  # 120 ms of silence at the end
-        found += [one + bytes([SILENCE, 173]) for one in found[:1]]  # 522 ms
-    return list(dict.fromkeys(found))
+        inputs += [one + bytes([SILENCE, 39]) for one in inputs[:1]]  # 120 ms of silence at the end
+        inputs += [one + bytes([SILENCE, 173]) for one in inputs[:1]]  # 522 ms
+    return list(dict.fromkeys(inputs))
 
 
 def wire_tokens(robots: int) -> list[bytes]:

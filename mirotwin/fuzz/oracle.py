@@ -114,10 +114,10 @@ def _questions(script: Sequence[ScriptItem], found_tick: int, robots: int, slot:
     A robot that lives acts on it, and answers.
     """
     tick = max(found_tick, _end_tick(script)) + FRESH_AGAIN_TICKS + _SETTLED_TICKS
-    found: list[Transmission] = []
+    transmissions: list[Transmission] = []
     for number in (1, 2):
         velocity = 256 * number
         frame = TeamFrame(FrameType.TEAM_ASK, slot + number * robots, ((velocity, velocity),) * robots)
-        found.append(Transmission(tick, DOWN, encode(frame, robots)))
-        tick = found[-1].end_tick + FRESH_AGAIN_TICKS + _SETTLED_TICKS
-    return found
+        transmissions.append(Transmission(tick, DOWN, encode(frame, robots)))
+        tick = transmissions[-1].end_tick + FRESH_AGAIN_TICKS + _SETTLED_TICKS
+    return transmissions

@@ -49,8 +49,8 @@ class Processor:
         if not self.cpu.peripherals.bit_ticks():  # the timer that clocks the serial port has to overflow once
             self.cpu.run(self.cpu.cycles + _CLOCK_CYCLES)
         if self.bus.fault_kind:
-            what = f"comes up with a fault: {self.fault()}"
-            raise BadInput(self.image.path, "", what, "mend it, or see `mirotwin fw run`")
+            reason = f"comes up with a fault: {self.fault()}"
+            raise BadInput(self.image.path, "", reason, "mend it, or see `mirotwin fw run`")
 
     def fault(self) -> FirmwareFault | None:
         """The first one since `RecordingBus.begin`."""
@@ -66,8 +66,8 @@ def bit_ticks_of(processor: Processor, crystal_hz: int, baud: int, boot_ms: int)
     if baud:
         ticks = (2 * crystal_hz + baud) // (2 * baud)
         if not baud >= 50 or ticks < FASTEST_BIT_TICKS:
-            what = f"{baud} is outside 50..{crystal_hz // FASTEST_BIT_TICKS} at {crystal_hz} Hz"
-            raise BadInput("", BAUD, what, "give the rate of the firmware")
+            reason = f"{baud} is outside 50..{crystal_hz // FASTEST_BIT_TICKS} at {crystal_hz} Hz"
+            raise BadInput("", BAUD, reason, "give the rate of the firmware")
         return ticks
     ticks = processor.cpu.peripherals.bit_ticks()
     if not ticks:

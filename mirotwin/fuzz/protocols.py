@@ -30,20 +30,20 @@ def protocol_named(text: str) -> Protocol:
 
     A file is run: `text` must come from the command line. Raises BadInput.
     """
-    found, name, parameters = _class_in_file(text) or _installed(text)
+    protocol, name, parameters = _class_in_file(text) or _installed(text)
     try:
         given = tomllib.loads(f"given = {{{parameters}}}")["given"]
     except tomllib.TOMLDecodeError:
         form = "write NAME:KEY=VALUE,KEY=VALUE, such as miro:robots=5"
         raise BadInput("", OPTION, f"{parameters!r} are no parameters", form) from None
     try:
-        return struct_of(given, found)
+        return struct_of(given, protocol)
     except TomlError as error:
-        keys = ", ".join(field.name for field in msgspec.structs.fields(found)) or "no parameters"
+        keys = ", ".join(field.name for field in msgspec.structs.fields(protocol)) or "no parameters"
         raise BadInput("", OPTION, f"{text}: {error.place}: {error.what}", f"{name} has {keys}") from None
     except (Exception, SystemExit) as error:  # from the protocol's own check of its parameters
-        what = f"{text}: cannot check its parameters: {raised(error)}"
-        raise BadInput("", OPTION, what, "repair the protocol") from error
+        reason = f"{text}: cannot check its parameters: {raised(error)}"
+        raise BadInput("", OPTION, reason, "repair the protocol") from error
 
 
 def _installed(text: str) -> tuple[type[Protocol], str, str]:
@@ -70,8 +70,8 @@ def asked(method: Callable[..., object], call: Callable[[], T]) -> T:
         return call()
     except (Exception, SystemExit) as error:
         name = method.__name__
-        what = at_place(f"`{name}` failed: {described(error)}", raised_at(error) or defined_at(method))
-        raise BadInput("", OPTION, what, f"let `{name}` do what miro_protocol.protocol says") from error
+        reason = at_place(f"`{name}` failed: {described(error)}", raised_at(error) or defined_at(method))
+        raise BadInput("", OPTION, reason, f"let `{name}` do what miro_protocol.protocol says") from error
 
 
 def shown(part: Frame | Damage) -> str:

@@ -71,8 +71,8 @@ class Results:
             yield f"{amount(triage.unrepeated, 'input')} that the engine saw failing did not fail again"
         if campaign.covering is not None and campaign.reached_by is None:
             inputs = amount(campaign.inputs or "no", "input")
-            what = f"--covering {campaign.covering.name}: not reached by {inputs}"
-            yield f"{what}; give it more --time, or a --corpus"
+            note = f"--covering {campaign.covering.name}: not reached by {inputs}"
+            yield f"{note}; give it more --time, or a --corpus"
         for name, verdict in self._open_checks().items():
             yield f"expectation {verdict}: {name}: no input that was looked at lets it judge"
 
@@ -83,8 +83,8 @@ class Results:
         for crash in triage.confirmed:
             yield from self._crash(crash)
         if triage.unconfirmed:
-            what = "not confirmed: wrong on the target, right in a World"
-            yield f"{len(triage.unconfirmed)} {what}; kept in {self.out / UNCONFIRMED}"
+            note = "not confirmed: wrong on the target, right in a World"
+            yield f"{len(triage.unconfirmed)} {note}; kept in {self.out / UNCONFIRMED}"
             for crash in triage.unconfirmed:
                 yield from self._crash(crash)
         reached_by, covering = self.campaign.reached_by, self.campaign.covering

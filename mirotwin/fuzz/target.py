@@ -92,14 +92,14 @@ class Target(ABC):
         """What the processor hears of an input, and its resets, at ticks since power-on."""
         program = self.program
         program.read(data)
-        found: list[ScriptItem] = []
+        items: list[ScriptItem] = []
         tick = first = self.harness.begin_tick + LEAD_TICKS
         values = bytearray()
         bad: list[int] = []
 
         def send() -> None:
             if values:
-                found.append(Transmission(first, DOWN, bytes(values), bad_stop=tuple(bad)))
+                items.append(Transmission(first, DOWN, bytes(values), bad_stop=tuple(bad)))
                 values.clear()
                 bad.clear()
 
@@ -108,7 +108,7 @@ class Target(ABC):
             if reset or pause:
                 send()
                 if reset:
-                    found += self._reset(tick)
+                    items += self._reset(tick)
                 tick += pause
                 first = tick
             if bad_stop:
@@ -117,26 +117,26 @@ class Target(ABC):
             tick += program.character_ticks
         send()
         if program.ends_with_reset():
-            found += self._reset(tick)
-        return found
+            items += self._reset(tick)
+        return items
 
     def _reset(self, tick: int) -> list[Action]:
-        at = tick + AHEAD_TICKS
-        return [Reset(at, 0, self.slot, 1), Reset(at + RESET_TICKS, 0, self.slot, 0)]
+        begin_tick = tick + AHEAD_TICKS
+        return [Reset(begin_tick, 0, self.slot, 1), Reset(begin_tick + RESET_TICKS, 0, self.slot, 0)]
 
     def describe(self, data: bytes) -> str:
         """An input as lines, one for each piece of what the processor hears."""
         return "\n".join(described(one) for one in self.script(data))
 
 
-def described(one: ScriptItem) -> str:
+def described(item: ScriptItem) -> str:
     """One line for people."""
-    if isinstance(one, Transmission):
-        bad = f", bad stop bits at {', '.join(map(str, one.bad_stop))}" if one.bad_stop else ""
-        return f"{one.tick}: {one.data.hex(' ')}{bad}"
-    if isinstance(one, Reset):
-        return f"{one.tick}: reset {one.level}"
-    return str(one)
+    if isinstance(item, Transmission):
+        bad = f", bad stop bits at {', '.join(map(str, item.bad_stop))}" if item.bad_stop else ""
+        return f"{item.tick}: {item.data.hex(' ')}{bad}"
+    if isinstance(item, Reset):
+        return f"{item.tick}: reset {item.level}"
+    return str(item)
 
 
 class RobotTarget(Target):
@@ -181,8 +181,8 @@ class RobotTarget(Target):
         if not self.code:
             return None
         if self.code == NEVER_SLEEPS_CODE:
-            what = "the firmware is awake 30 ms after the last character"
-            return TargetFailure(NEVER_SLEEPS, self.harness.now_tick, 0, what)
+            reason = "the firmware is awake 30 ms after the last character"
+            return TargetFailure(NEVER_SLEEPS, self.harness.now_tick, 0, reason)
         check, tick = NAMES[self.code], self.oracle.tick
         if self.board.faults:
             return TargetFailure(check, tick, self.oracle.pc, str(self.board.faults[0]))

@@ -114,25 +114,25 @@ class Triage:
             return None
         group = failure.check, failure.pc or None
 
-        def fails(one: bytes) -> bool:
-            found = self._failure(one)
-            return found is not None and (found.check, found.pc or None) == group
+        def fails(shorter: bytes) -> bool:
+            remaining = self._failure(shorter)
+            return remaining is not None and (remaining.check, remaining.pc or None) == group
 
-        def judged(one: bytes) -> tuple[Run, str]:
-            again = self._failure(one) or failure
-            return self.oracle.confirm(one, again), again.what
+        def judged(shorter: bytes) -> tuple[Run, str]:
+            again = self._failure(shorter) or failure
+            return self.oracle.confirm(shorter, again), again.what
 
         return self._take(data, group, TRIES, fails, judged)
 
     def take_judged(self, data: bytes, failure: Failure, expected: Expected) -> Crash | None:
         """An input in whose World one of the checks in `expected` failed; the crash, if it is a new one."""
 
-        def judged(one: bytes) -> tuple[Run, str]:
-            return self.oracle.judged(one, expected), ""
+        def judged(shorter: bytes) -> tuple[Run, str]:
+            return self.oracle.judged(shorter, expected), ""
 
-        def fails(one: bytes) -> bool:
-            found = judged(one)[0].failure
-            return found is not None and found.check == failure.check
+        def fails(shorter: bytes) -> bool:
+            remaining = judged(shorter)[0].failure
+            return remaining is not None and remaining.check == failure.check
 
         return self._take(data, (failure.check, None), TRIES_IN_A_WORLD, fails, judged)
 

@@ -49,10 +49,10 @@ def topic_of(topic: str) -> Topic | None:
     """What `topic` names; None if it has not the form of one of ours."""
     if topic == PERIOD:
         return Topic(PERIOD)
-    found = _TOPIC.fullmatch(topic)
-    if found is None:
+    match = _TOPIC.fullmatch(topic)
+    if match is None:
         return None
-    network, slot, channel = found.groups()
+    network, slot, channel = match.groups()
     return Topic(channel, int(network), -1 if slot is None else int(slot))
 
 
@@ -326,10 +326,15 @@ def transmission(network: int, message: WireMessage) -> Transmission:
     return Transmission(message.tick, message.direction, data, network, message.bad_stop)
 
 
-def robot_period(network: int, slot: int, found: dict[str, Any]) -> RobotPeriod:
+def robot_period(network: int, slot: int, messages: dict[str, Any]) -> RobotPeriod:
     """The record of one robot from its messages by channel. Raises KeyError when one is missing."""
-    truth, firmware, lm629, pwm = found["truth"], found.get("firmware"), found["lm629"], found["pwm"]
-    reference, seen, control = found["reference"], found.get("measurement"), found.get("control")
+    truth, firmware, lm629, pwm = (
+        messages["truth"],
+        messages.get("firmware"),
+        messages["lm629"],
+        messages["pwm"],
+    )
+    reference, measured, control = messages["reference"], messages.get("measurement"), messages.get("control")
     accepted, rejected, stale = (None, None, None) if firmware is None else astuple(firmware)[1:]
     return RobotPeriod(
         network,
@@ -338,7 +343,7 @@ def robot_period(network: int, slot: int, found: dict[str, Any]) -> RobotPeriod:
         _posture(truth),
         truth.v_m_s,
         truth.w_rad_s,
-        None if seen is None else _measurement(seen),
+        None if measured is None else _measurement(measured),
         None if control is None else Control(*astuple(control)[1:]),
         accepted,
         rejected,

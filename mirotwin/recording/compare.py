@@ -77,9 +77,9 @@ def differences(
     if not periods:
         return []
     one, other = recorded[:periods], replayed[:periods]
-    found = sorted(_all(one, other, rule), key=attrgetter("tick"))
+    ordered = sorted(_all(one, other, rule), key=attrgetter("tick"))
     to_tick = NEVER_TICK if rule.to_tick is None else rule.to_tick
-    return [difference for difference in found if rule.from_tick <= difference.tick < to_tick]
+    return [difference for difference in ordered if rule.from_tick <= difference.tick < to_tick]
 
 
 def _all(one: Sequence[Period], other: Sequence[Period], rule: CompareRule) -> Iterator[Difference]:
@@ -126,9 +126,9 @@ def _values(robot: RobotPeriod, twin: RobotPeriod, rule: CompareRule) -> Named:
 def _wheels(robot: RobotPeriod, twin: RobotPeriod, rule: CompareRule) -> Named:
     for side, axis, other in (("left", robot.left, twin.left), ("right", robot.right, twin.right)):
         for name in ("real_position", "desired_position"):
-            one, two = getattr(axis, name), getattr(other, name)
-            if abs(one - two) > rule.within_counts:
-                yield f"lm629 {side} {name}", one, two
+            expected, actual = getattr(axis, name), getattr(other, name)
+            if abs(expected - actual) > rule.within_counts:
+                yield f"lm629 {side} {name}", expected, actual
         velocity, twins = axis.desired_velocity, other.desired_velocity
         if abs(velocity - twins) > rule.within_counts_per_sample * _VELOCITY_UNIT:
             yield f"lm629 {side} desired_velocity", velocity, twins
@@ -196,11 +196,11 @@ def _response(robot: RobotPeriod) -> NamedValues:
 def _of_host(robot: RobotPeriod) -> NamedValues:
     """What its PC measured and commanded, and where it should be."""
     yield from _posture("reference", robot.reference)
-    seen = robot.measurement
-    yield from _posture("measurement", seen)
-    if isinstance(seen, Sighting):
-        yield "measurement exposed_tick", seen.tick
-        yield "measurement confidence", seen.confidence
+    measured = robot.measurement
+    yield from _posture("measurement", measured)
+    if isinstance(measured, Sighting):
+        yield "measurement exposed_tick", measured.tick
+        yield "measurement confidence", measured.confidence
     control = robot.control
     for name in ("v_m_s", "w_rad_s", "left", "right"):
         yield f"control {name}", getattr(control, name, None)
@@ -216,6 +216,6 @@ def _axis(side: str, axis: Axis) -> NamedValues:
     yield f"pwm {side} magnitude", axis.pwm_magnitude
 
 
-def _posture(name: str, at: Posture | None) -> NamedValues:
+def _posture(name: str, posture: Posture | None) -> NamedValues:
     for field in ("x_m", "y_m", "theta_rad"):
-        yield f"{name} {field}", None if at is None else getattr(at, field)
+        yield f"{name} {field}", None if posture is None else getattr(posture, field)

@@ -107,8 +107,8 @@ class Records:
         if magic != MAGIC:
             if magic and MAGIC.startswith(magic):
                 self._cut()
-            what = "not an MCAP file" if magic else "empty file"
-            self._fail(what, "give a run.mcap that `mirotwin run` wrote")
+            reason = "not an MCAP file" if magic else "empty file"
+            self._fail(reason, "give a run.mcap that `mirotwin run` wrote")
         self.offset = len(magic)
         self.checksum = crc32(magic)
 
@@ -123,8 +123,8 @@ class Records:
         else:
             self.checksum = crc32(body, crc32(head, self.checksum))
 
-    def _compare(self, written: bytes, found: int) -> None:
-        if len(written) != _CRC or int.from_bytes(written, "little") not in (0, found):
+    def _compare(self, written: bytes, computed: int) -> None:
+        if len(written) != _CRC or int.from_bytes(written, "little") not in (0, computed):
             self._damaged("the checksum of what comes before it is wrong")
 
     def _end(self) -> None:
@@ -147,16 +147,18 @@ class Records:
         if self.last == MAGIC:  # as a whole file ends; so what is wrong is a length
             self._damaged("its length is more than the file holds")
         if not self.data_ended and (within is None or within in _IN_CHUNKS):
-            what = "the recording has no end: the run that wrote it was broken off"
-            raise BrokenOff(self.path, f"offset {self.offset}", what, "record the run again for a whole one")
-        what, remedy = "the file ends in the middle of a record", "copy it again, or record the run again"
-        raise Cut(self.path, f"offset {self.offset}", what, f"it was cut short; {remedy}")
+            reason = "the recording has no end: the run that wrote it was broken off"
+            raise BrokenOff(
+                self.path, f"offset {self.offset}", reason, "record the run again for a whole one"
+            )
+        reason, remedy = "the file ends in the middle of a record", "copy it again, or record the run again"
+        raise Cut(self.path, f"offset {self.offset}", reason, f"it was cut short; {remedy}")
 
-    def _damaged(self, what: str) -> NoReturn:
-        self._fail(f"damaged record ({what})", "copy the file again, or record the run again")
+    def _damaged(self, reason: str) -> NoReturn:
+        self._fail(f"damaged record ({reason})", "copy the file again, or record the run again")
 
-    def _fail(self, what: str, remedy: str) -> NoReturn:
-        raise RecordingError(self.path, f"offset {self.offset}", what, remedy) from None
+    def _fail(self, reason: str, remedy: str) -> NoReturn:
+        raise RecordingError(self.path, f"offset {self.offset}", reason, remedy) from None
 
 
 def _in(opcode: int, body: bytes, whole: bool) -> Iterator[McapRecord]:

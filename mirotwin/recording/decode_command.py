@@ -71,21 +71,23 @@ def decode(options: DecodeOptions) -> int:
         source = open_source(given, format, complain, DIRECTIONS[direction or "down"])
         layouts = look(source, None if robots is None else int(robots), complain, direction is None)
         with ProgressBar("decoding", given.size, options.quiet or sys.stdout.isatty()) as bar:
-            found = rows(_counted(source.sent, given, bar), layouts.of)
-            return _print(given, source, layouts, found, options.as_json)
+            decoded = rows(_counted(source.sent, given, bar), layouts.of)
+            return _print(given, source, layouts, decoded, options.as_json)
 
 
 def _counted(sent: Iterable[Transmission], given: Input, bar: ProgressBar) -> Iterator[Transmission]:
     """Moves the progress bar; for input without a size (a pipe), flushes the lines printed so far."""
-    for one in sent:
-        yield one
+    for transmission in sent:
+        yield transmission
         if given.size is None:
             sys.stdout.flush()
         else:
             bar.to(given.position)
 
 
-def _print(given: Input, source: Source, layouts: Layouts, found: Iterable[DecodedRow], as_json: bool) -> int:
+def _print(
+    given: Input, source: Source, layouts: Layouts, decoded: Iterable[DecodedRow], as_json: bool
+) -> int:
     def put(line: object) -> None:
         sys.stdout.write(f"{line}\n")
 
@@ -98,7 +100,7 @@ def _print(given: Input, source: Source, layouts: Layouts, found: Iterable[Decod
         put(render.head_line(source.timed))
     totals, line_of = render.Totals(), render.json_line if as_json else render.table_line
     try:
-        for row in found:
+        for row in decoded:
             totals.add(row)
             put(line_of(row, source.timed))
     except READ_ERRORS as error:

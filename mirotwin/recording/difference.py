@@ -70,11 +70,13 @@ class Difference(msgspec.Struct, frozen=True):
         }
 
 
-def first_per_channel(found: Iterable[Difference]) -> list[tuple[Difference, int]]:
-    """The first difference of each channel of each robot, and how many the channel has; in the order of `found`."""
+def first_per_channel(differences: Iterable[Difference]) -> list[tuple[Difference, int]]:
+    """The first difference of each channel of each robot, and the channel's number of differences, in their order."""
     by_channel: dict[tuple[int, int, str], list[Difference]] = {}
-    for one in found:
-        by_channel.setdefault((one.network, one.slot, one.channel), []).append(one)
+    for difference in differences:
+        by_channel.setdefault((difference.network, difference.slot, difference.channel), []).append(
+            difference
+        )
     return [(alike[0], len(alike)) for alike in by_channel.values()]
 
 

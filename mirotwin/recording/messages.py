@@ -78,10 +78,10 @@ class Messages:
                 self.broken_off += f": {one_line(shortened(record.metadata['reason']))}"
         elif record.name == METADATA:
             self.metadata = record.metadata
-            found = record.metadata.get("format")
-            if found != FORMAT:
+            recorded_format = record.metadata.get("format")
+            if recorded_format != FORMAT:
                 remedy = f"this program reads format {FORMAT}; use the version that wrote it, or {AGAIN}"
-                raise self.error(f"recording format {found!r}", remedy)
+                raise self.error(f"recording format {recorded_format!r}", remedy)
 
     def drain(self) -> None:
         """Reads to the end. Raises RecordingError for what the container's checksums say about the rest."""
@@ -91,11 +91,11 @@ class Messages:
     def check_ours(self) -> None:
         """Raises RecordingError unless what was read is a recording of this program."""
         if self.metadata is None:
-            what = "an MCAP file, but not a recording of this program"
-            raise self.error(what, "give a run.mcap that it wrote")
+            reason = "an MCAP file, but not a recording of this program"
+            raise self.error(reason, "give a run.mcap that it wrote")
 
-    def error(self, what: str, remedy: str) -> RecordingError:
-        return RecordingError(self.path, f"offset {self.offset}", what, remedy)
+    def error(self, reason: str, remedy: str) -> RecordingError:
+        return RecordingError(self.path, f"offset {self.offset}", reason, remedy)
 
     def unfit(self, error: Exception) -> RecordingError:
         """The last message cannot be what it says."""

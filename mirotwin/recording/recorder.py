@@ -154,9 +154,9 @@ class Recorder:
             self.flush()
             self._flushed_s = now_s
 
-    def write(self, one: Period | Message) -> None:
+    def write(self, item: Period | Message) -> None:
         """Adds everything in a control period, or a message."""
-        self._waiting.append(one)
+        self._waiting.append(item)
         if len(self._waiting) >= TOGETHER:
             with self._undisturbed:
                 self._write_waiting()
@@ -169,9 +169,9 @@ class Recorder:
         waiting, self._waiting = self._waiting, []
         self._rows.write_all(waiting)
 
-    def write_theories(self, found: Iterable[tuple[int, int, TheoryMessage]]) -> None:
+    def write_theories(self, theories: Iterable[tuple[int, int, TheoryMessage]]) -> None:
         """Adds what the theory says of robots (network, slot) in the control period that was written last."""
-        for network, slot, message in found:
+        for network, slot, message in theories:
             self.add("theory", network, slot, message)
 
     def write_faults(self, robots: Iterable[Robot]) -> None:

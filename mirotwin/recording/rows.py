@@ -129,12 +129,12 @@ class MessageWriter:
 
     def write_all(self, waiting: list[Period | Message]) -> None:
         """Writes periods and single messages, in turn."""
-        for one in waiting:
-            if isinstance(one, tuple):
-                topic, tick, message = one
+        for item in waiting:
+            if isinstance(item, tuple):
+                topic, tick, message = item
                 self._add(topic, tick * 125 // 3, message)  # `nanoseconds`
             else:
-                self._period(one)
+                self._period(item)
 
     def _period(self, period: Period) -> None:
         tick = period.tick
@@ -151,13 +151,15 @@ class MessageWriter:
     def _robot(self, robot: RobotPeriod, tick: int, time_ns: int) -> None:
         """All messages of one robot."""
         names: list[str] = _robot_topics(robot.network, robot.slot)
-        at, true, seen, control = robot.reference, robot.truth, robot.measurement, robot.control
-        self._add(names[0], time_ns, PostureMessage(tick, at.x_m, at.y_m, at.theta_rad))
+        wanted, true, measured, control = robot.reference, robot.truth, robot.measurement, robot.control
+        self._add(names[0], time_ns, PostureMessage(tick, wanted.x_m, wanted.y_m, wanted.theta_rad))
         speeds = robot.v_m_s, robot.w_rad_s
         self._add(names[1], time_ns, TruthMessage(tick, true.x_m, true.y_m, true.theta_rad, *speeds))
-        if seen is not None:
-            of_picture = (seen.tick, seen.confidence) if isinstance(seen, Sighting) else (None, None)
-            message = MeasurementMessage(tick, seen.x_m, seen.y_m, seen.theta_rad, *of_picture)
+        if measured is not None:
+            of_picture = (
+                (measured.tick, measured.confidence) if isinstance(measured, Sighting) else (None, None)
+            )
+            message = MeasurementMessage(tick, measured.x_m, measured.y_m, measured.theta_rad, *of_picture)
             self._add(names[2], time_ns, message)
         if control is not None:
             self._add(names[3], time_ns, ControlMessage(tick, *astuple(control)))

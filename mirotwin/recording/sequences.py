@@ -34,8 +34,8 @@ def commands(periods: Sequence[Period], index: int, side: str, answers: bool) ->
 
     What a chip answers, a position say, depends on when it was asked.
     """
-    found = (command for period in periods for command in getattr(period.robots[index], side).commands)
-    return [LogEntry(tick, _command(opcode, data, answers)) for tick, opcode, data in found]
+    logged = (command for period in periods for command in getattr(period.robots[index], side).commands)
+    return [LogEntry(tick, _command(opcode, data, answers)) for tick, opcode, data in logged]
 
 
 def transmissions(periods: Sequence[Period], network: int, sent: bool) -> list[LogEntry]:
@@ -45,11 +45,11 @@ def transmissions(periods: Sequence[Period], network: int, sent: bool) -> list[L
 
 def characters(periods: Sequence[Period], network: int) -> list[LogEntry]:
     """Characters from its robots, one by one: the pauses between them do not matter."""
-    found = []
-    for one in on_air(periods, network, False):
-        for value, stop_good, tick in one.symbols():
-            found.append(LogEntry(tick, f"{value:02x}{'' if stop_good else ' with a bad stop bit'}"))
-    return found
+    entries = []
+    for transmission in on_air(periods, network, False):
+        for value, stop_good, tick in transmission.symbols():
+            entries.append(LogEntry(tick, f"{value:02x}{'' if stop_good else ' with a bad stop bit'}"))
+    return entries
 
 
 def _command(opcode: int, data: str, answers: bool) -> str:
@@ -62,28 +62,28 @@ def _command(opcode: int, data: str, answers: bool) -> str:
 
 def actions(periods: Sequence[Period], network: int) -> list[LogEntry]:
     """What was done to a network's robots and its radio."""
-    found = (action for period in periods for action in period.actions if action.network == network)
-    return [LogEntry(action.tick, _action(action)) for action in found]
+    logged = (action for period in periods for action in period.actions if action.network == network)
+    return [LogEntry(action.tick, _action(action)) for action in logged]
 
 
 def _action(action: Action) -> str:
     if isinstance(action, RadioState):
         return f"radio {action.state}"
-    what, level = ("reset", action.level) if isinstance(action, Reset) else ("power", action.on)
-    return f"robot {action.slot} {what} {level}"
+    name, level = ("reset", action.level) if isinstance(action, Reset) else ("power", action.on)
+    return f"robot {action.slot} {name} {level}"
 
 
 def on_air(periods: Sequence[Period], network: int, sent: bool) -> Iterator[Transmission]:
     """What was said on a network's air: by its host as `sent`, or else by its robots as the PC heard them."""
     for period in periods:
-        for one in period.wire:
-            if one.network == network and (one.direction == DOWN) == sent:
-                yield one
+        for transmission in period.wire:
+            if transmission.network == network and (transmission.direction == DOWN) == sent:
+                yield transmission
 
 
-def _text(one: Transmission) -> str:
-    bad = f", bad stop bits at {', '.join(map(str, one.bad_stop))}," if one.bad_stop else ""
-    return f"{one.data.hex(' ')}{bad}"
+def _text(transmission: Transmission) -> str:
+    bad = f", bad stop bits at {', '.join(map(str, transmission.bad_stop))}," if transmission.bad_stop else ""
+    return f"{transmission.data.hex(' ')}{bad}"
 
 
 def unlike(one: Sequence[LogEntry], other: Sequence[LogEntry], within_ticks: int) -> Iterator[Pair]:
@@ -127,11 +127,11 @@ def pairs(
     yield from ((None, there) for there in other[second:])
 
 
-def _follows(found: Sequence[LogEntry], index: int, wanted: LogEntry, within_ticks: int) -> bool:
+def _follows(entries: Sequence[LogEntry], index: int, wanted: LogEntry, within_ticks: int) -> bool:
     """Whether one behind `index` says what `wanted` says, at its time."""
-    for place in range(index + 1, len(found)):
-        if found[place].tick > wanted.tick + within_ticks:
+    for place in range(index + 1, len(entries)):
+        if entries[place].tick > wanted.tick + within_ticks:
             return False
-        if found[place].text == wanted.text and found[place].tick >= wanted.tick - within_ticks:
+        if entries[place].text == wanted.text and entries[place].tick >= wanted.tick - within_ticks:
             return True
     return False

@@ -88,10 +88,10 @@ class Postures:
     def __init__(self) -> None:
         self.x_m, self.y_m, self.theta_rad = column(), column(), column()
 
-    def append(self, at: Posture | None) -> None:
-        self.x_m.append(NAN if at is None else at.x_m)
-        self.y_m.append(NAN if at is None else at.y_m)
-        self.theta_rad.append(NAN if at is None else at.theta_rad)
+    def append(self, posture: Posture | None) -> None:
+        self.x_m.append(NAN if posture is None else posture.x_m)
+        self.y_m.append(NAN if posture is None else posture.y_m)
+        self.theta_rad.append(NAN if posture is None else posture.theta_rad)
 
     def points_cm(self) -> tuple[list[float], list[float]]:
         """x and y of those that are there."""
@@ -129,13 +129,17 @@ class MeasuredErrors(TrackingErrors):
             return
         self._references[tick] = robot.reference
         self._references.pop(tick - LONGEST_FRAMES * CONTROL_PERIOD_TICKS, None)
-        seen = robot.measurement
-        if seen is None:
+        measured = robot.measurement
+        if measured is None:
             return
-        exposed = seen.tick if isinstance(seen, Sighting) else tick - self.delay_frames * CONTROL_PERIOD_TICKS
+        exposed = (
+            measured.tick
+            if isinstance(measured, Sighting)
+            else tick - self.delay_frames * CONTROL_PERIOD_TICKS
+        )
         reference = self._references.get(exposed)
         if reference is not None:
-            self.append(error_of(seen, reference, exposed))
+            self.append(error_of(measured, reference, exposed))
 
 
 class RobotTrack:
@@ -203,12 +207,12 @@ def wrapped(angle_rad: float) -> float:
     return angle + TWO_PI if angle <= -math.pi else angle
 
 
-def error_of(at: Posture, reference: Posture, tick: int) -> ErrorSample:
-    """The tracking error of a robot that is `at` a posture instead of the reference's."""
+def error_of(posture: Posture, reference: Posture, tick: int) -> ErrorSample:
+    """The tracking error of a robot at `posture` against the `reference`, at `tick`."""
     return ErrorSample(
         tick,
-        100.0 * (at.x_m - reference.x_m),
-        100.0 * (at.y_m - reference.y_m),
-        wrapped(at.theta_rad - reference.theta_rad),
-        not pitch.holds(Posture(at.x_m, at.y_m, wrapped(at.theta_rad))),
+        100.0 * (posture.x_m - reference.x_m),
+        100.0 * (posture.y_m - reference.y_m),
+        wrapped(posture.theta_rad - reference.theta_rad),
+        not pitch.holds(Posture(posture.x_m, posture.y_m, wrapped(posture.theta_rad))),
     )

@@ -101,28 +101,28 @@ def diff(options: DiffOptions) -> int:
         remedy = "`mirotwin replay` compares a recording made at a port with its twin"
         raise BadInput("", "--compare answers", "is for robots at a port, beside their twin", remedy)
     sources = checked_sources(options.sources)
-    one, other = _run_images(options) if _are_images(options) else _read_recordings(options)
-    one, other = _with_same_robots(one, other)
-    (spec, *_), (other_spec, *_) = one.ways, other.ways
-    rule, notes = _rule(compare.rule(spec.scenario.clock), one, other)
-    for run in (one, other):
+    first, other = _run_images(options) if _are_images(options) else _read_recordings(options)
+    first, other = _with_same_robots(first, other)
+    (spec, *_), (other_spec, *_) = first.ways, other.ways
+    rule, notes = _rule(compare.rule(spec.scenario.clock), first, other)
+    for run in (first, other):
         check_reaches(rule, run.ways[0].origin, run.periods)
     known = load_images(options.lines_from, spec.image, other_spec.image)
     annotate = partial(annotated_of, images=known, sources=sources)
     alike = (spec.scenario, spec.seed) == (other_spec.scenario, other_spec.seed)
-    found = compare_runs(one, other, rule, (annotate, annotate), NAMES, alike)
-    found = replace(found, notes=(*one.notes, *other.notes, *notes, *found.notes))
-    origins = [*source_differences(one, other)]
+    difference = compare_runs(first, other, rule, (annotate, annotate), NAMES, alike)
+    difference = replace(difference, notes=(*first.notes, *other.notes, *notes, *difference.notes))
+    origins = [*source_differences(first, other)]
     if options.shows:
-        show(*source_tables(origins, NAMES), *difference_tables(found, options.everything))
-    code = _report(options, one, other, found, alike=not origins)
+        show(*source_tables(origins, NAMES), *difference_tables(difference, options.everything))
+    code = _report(options, first, other, difference, alike=not origins)
     if compare.as_json:
         document: dict[str, Any] = {"a": file_in(options.a), "b": file_in(options.b)}
-        if not one.recorded:
+        if not first.recorded:
             document |= {"on": options.on, "seed": spec.seed}
         document["sources"] = [each.as_json() for each in origins]
-        document["periods"] = {"a": len(one.periods), "b": len(other.periods)}
-        document |= rule_as_json(rule) | found.as_json(options.everything) | {"exit_code": code}
+        document["periods"] = {"a": len(first.periods), "b": len(other.periods)}
+        document |= rule_as_json(rule) | difference.as_json(options.everything) | {"exit_code": code}
         print_json(document)
     return code
 
@@ -136,8 +136,8 @@ def _are_images(options: DiffOptions) -> bool:
         line = command_line("replay", operand(recording), "--firmware", operand(images[0]))
         raise BadInput(images[0], "", f"is an image, and {recording} is none", f"give two, or use `{line}`")
     if not images:
-        what = "is for two images, and a recording has its own"
-        refuse_given(paths[0], what, options.given("on", "seed", "settings"))
+        reason = "is for two images, and a recording has its own"
+        refuse_given(paths[0], reason, options.given("on", "seed", "settings"))
     return bool(images)
 
 
@@ -163,8 +163,8 @@ def _read_recording(path: str) -> ComparedRun:
     if not recording.periods:
         raise BadInput(path, "", "the recording holds no control period", "there is nothing to compare")
     if source.resumed:
-        what = f"a run that was resumed: it begins with control period {recording.periods[0].index}"
-        raise BadInput(path, "", what, "replay it, or compare recordings of whole runs")
+        reason = f"a run that was resumed: it begins with control period {recording.periods[0].index}"
+        raise BadInput(path, "", reason, "replay it, or compare recordings of whole runs")
     complain(*recording_notes(recording, path))
     sent = recorded_spec(recording, path)
     ways = replace(sent, computed=True), sent
@@ -178,8 +178,8 @@ def _run_images(options: DiffOptions) -> tuple[ComparedRun, ComparedRun]:
         complain(*job.notes)
         spec, end_tick = job.spec, job.end_tick
         if job.alone and options.compare.kind not in ("bits", "bytes"):
-            what = f"is for robots, and {on} is for a board alone"
-            raise BadInput("", f"--compare {options.compare.kind}", what, "compare bits or bytes")
+            reason = f"is for robots, and {on} is for a board alone"
+            raise BadInput("", f"--compare {options.compare.kind}", reason, "compare bits or bytes")
     else:
         text = load(on, options.settings)
         tell_notes(text.notes)
@@ -229,32 +229,32 @@ def _only(period: Period, robots: Sequence[RobotId]) -> Period:
     return replace(period, robots=tuple(by_place[place] for place in robots))
 
 
-def _rule(rule: CompareRule, one: ComparedRun, other: ComparedRun) -> tuple[CompareRule, list[str]]:
+def _rule(rule: CompareRule, run: ComparedRun, other: ComparedRun) -> tuple[CompareRule, list[str]]:
     """With what only recordings are compared in; and why digests are not, if they should."""
-    bits, recorded = rule.kind == "bits", one.recorded
-    digests = bits and recorded and one.state == other.state  # they are of states of one form
+    bits, recorded = rule.kind == "bits", run.recorded
+    digests = bits and recorded and run.state == other.state  # they are of states of one form
     why = "their states have another form, by scenario or version of this program"
     notes = [f"the digests are not compared: {why}"] if bits and recorded and not digests else []
-    period_ticks = one.ways[0].scenario.period_ticks
+    period_ticks = run.ways[0].scenario.period_ticks
     return replace(rule, host=bits, digests=digests, period_ticks=period_ticks), notes
 
 
 def _report(
-    options: DiffOptions, one: ComparedRun, other: ComparedRun, found: RunDifference, alike: bool
+    options: DiffOptions, run: ComparedRun, other: ComparedRun, difference: RunDifference, alike: bool
 ) -> int:
     """Lines for people; the exit code. `alike`: they were made from the same."""
-    noun = "recordings" if one.recorded else "images"
-    shorter, longer = sorted((one.periods, other.periods), key=len)
+    noun = "recordings" if run.recorded else "images"
+    shorter, longer = sorted((run.periods, other.periods), key=len)
     cut = len(shorter) != len(longer) and options.compare.to_time is None
-    complain(*difference_lines(found, f"the {noun} differ"))
+    complain(*difference_lines(difference, f"the {noun} differ"))
     if cut:
-        complain(f"A has {amount(len(one.periods), 'control period')}, B has {len(other.periods)}")
-    complain(*found.notes)
-    if found.differences or cut:
+        complain(f"A has {amount(len(run.periods), 'control period')}, B has {len(other.periods)}")
+    complain(*difference.notes)
+    if difference.differences or cut:
         return exit_code("differs")
     if not options.compare.as_json:
-        whole = extent(found.rule, shorter)
+        whole = extent(difference.rule, shorter)
         whence = "" if alike else "; they were not made from the same"
         recorded = f"the recordings hold the same in {whole}{whence}"
-        show(recorded if one.recorded else f"on {options.on}, the images do the same in {whole}")
+        show(recorded if run.recorded else f"on {options.on}, the images do the same in {whole}")
     return DONE

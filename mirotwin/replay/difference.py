@@ -79,8 +79,8 @@ class RunDifference(msgspec.Struct, frozen=True):
     @property
     def seen_tick(self) -> int:
         """When something differs that is more than a digest: dead bytes of a stack are enough for that."""
-        seen = [each.tick for each in self.differences if each.channel != DIGEST]
-        return (seen or [self.differences[0].tick])[0]
+        ticks = [each.tick for each in self.differences if each.channel != DIGEST]
+        return (ticks or [self.differences[0].tick])[0]
 
     def as_json(self, everything: bool) -> dict[str, Any]:
         """`channels`: the first difference of each; `differences` only if all are wanted."""
@@ -110,7 +110,7 @@ _NOT_RECORDED = (
 
 
 def compare_runs(
-    one: ComparedRun,
+    run: ComparedRun,
     other: ComparedRun,
     rule: CompareRule,
     annotate: tuple[Annotate, Annotate],
@@ -122,56 +122,67 @@ def compare_runs(
     `annotate`: finds the debug files of their images. `only_firmware`: apart from that they were made alike, so that
     its first changed instruction is looked for.
     """
-    found = RunDifference(names, differences(one.periods, other.periods, rule), rule=rule)
-    if not found.differences:
-        return found
-    if one.ways:
-        scenario = one.ways[0].scenario
-        in_time = [replace(each, clock=scenario.clock) for each in found.differences]
-        found = replace(found, differences=in_time, alone=isinstance(scenario, BoardScenario))
-    if not one.ways or not other.ways:
-        return replace(found, notes=("they cannot be run again: what was recorded is no firmware image",))
+    difference = RunDifference(names, differences(run.periods, other.periods, rule), rule=rule)
+    if not difference.differences:
+        return difference
+    if run.ways:
+        scenario = run.ways[0].scenario
+        in_time = [replace(each, clock=scenario.clock) for each in difference.differences]
+        difference = replace(difference, differences=in_time, alone=isinstance(scenario, BoardScenario))
+    if not run.ways or not other.ways:
+        return replace(
+            difference, notes=("they cannot be run again: what was recorded is no firmware image",)
+        )
     try:
         with plain_parameters("the run", "repeated"):
-            return _repeated(found, one, other, annotate if only_firmware else None)
+            return _repeated(difference, run, other, annotate if only_firmware else None)
     except BadInput as error:
-        return replace(found, notes=(f"they cannot be run again: {error}",))
+        return replace(difference, notes=(f"they cannot be run again: {error}",))
 
 
 def _repeated(
-    found: RunDifference, one: ComparedRun, other: ComparedRun, annotate: tuple[Annotate, Annotate] | None
+    difference: RunDifference,
+    run: ComparedRun,
+    other: ComparedRun,
+    annotate: tuple[Annotate, Annotate] | None,
 ) -> RunDifference:
     """`annotate` None: no instruction is looked for."""
-    first, unrepeated = _first_period(one, other, found.period), set(found.names)
-    for way, other_way in zip(one.ways, other.ways, strict=True):
-        world, other_world = one.again(way, first), other.again(other_way, first)
+    first, unrepeated = _first_period(run, other, difference.period), set(difference.names)
+    for way, other_way in zip(run.ways, other.ways, strict=True):
+        world, other_world = run.again(way, first), other.again(other_way, first)
         if world is not None and other_world is not None:
             break
-        repeated = found.names[0] if world is not None else found.names[1] if other_world is not None else ""
+        repeated = (
+            difference.names[0]
+            if world is not None
+            else difference.names[1]
+            if other_world is not None
+            else ""
+        )
         unrepeated.discard(repeated)
     else:
         whose = f"{unrepeated.pop()} does" if len(unrepeated) == 1 else "they do"
-        return replace(found, notes=(_OTHER_DIGESTS.format(whose),))
-    end_tick = (max(first, found.period) + 1) * world.period_ticks
+        return replace(difference, notes=(_OTHER_DIGESTS.format(whose),))
+    end_tick = (max(first, difference.period) + 1) * world.period_ticks
     state = first_difference(world, other_world, end_tick, world.period_ticks)
     if state is None:
-        return replace(found, notes=(_NOT_RECORDED.format(found.period),))
+        return replace(difference, notes=(_NOT_RECORDED.format(difference.period),))
     instruction = None
     if annotate is not None and way.image.code != other_way.image.code:
         instruction = first_instruction(
             other_way.world,
             annotate[0](way.image),
             annotate[1](other_way.image),
-            found.seen_tick + LOOK_TICKS,
+            difference.seen_tick + LOOK_TICKS,
         )
-    return replace(found, state=state, instruction=instruction)
+    return replace(difference, state=state, instruction=instruction)
 
 
-def _first_period(one: ComparedRun, other: ComparedRun, seen: int) -> int:
+def _first_period(run: ComparedRun, other: ComparedRun, period: int) -> int:
     """Up to where nobody need look: the states differ first in that control period, by the recorded digests."""
-    if not (one.recorded and other.recorded):
+    if not (run.recorded and other.recorded):
         return 0
-    for here, there in zip(one.periods, other.periods, strict=False):
+    for here, there in zip(run.periods, other.periods, strict=False):
         if here.digest != there.digest:
             return here.index
-    return max(0, seen - 1)
+    return max(0, period - 1)

@@ -33,10 +33,10 @@ _APPLIES = {
 """A tolerance, and the comparisons that have it."""
 
 
-def refuse_given(file: str, what: str, given: Sequence[str]) -> None:
+def refuse_given(file: str, reason: str, given: Sequence[str]) -> None:
     """Raises BadInput for the first of the options that were given and mean nothing here."""
     if given:
-        raise BadInput(file, given[0], what, "leave it out")
+        raise BadInput(file, given[0], reason, "leave it out")
 
 
 class CompareOptions(Options, frozen=True, kw_only=True):
@@ -89,8 +89,8 @@ class CompareOptions(Options, frozen=True, kw_only=True):
             for option in self.given(name):
                 if self.kind not in kinds:
                     whose = " or ".join(f"--compare {each}" for each in kinds)
-                    what = f"does not apply to --compare {self.kind}"
-                    raise BadInput("", option, what, f"give {whose} with it")
+                    reason = f"does not apply to --compare {self.kind}"
+                    raise BadInput("", option, reason, f"give {whose} with it")
         window(self.from_time, self.to_time)
 
     def rule(self, clock: int = TICKS_PER_SECOND) -> CompareRule:
@@ -124,11 +124,11 @@ def check_reaches(rule: CompareRule, file: str, recorded: Sequence[Period]) -> N
     first, last = recorded[0], recorded[-1]
     end_tick = last.tick + rule.period_ticks
     if rule.from_tick >= end_tick:
-        what = f"the recording ends at tick {end_tick}"
-        raise BadInput(file, f"--from {rule.from_tick}t", what, "look earlier")
+        reason = f"the recording ends at tick {end_tick}"
+        raise BadInput(file, f"--from {rule.from_tick}t", reason, "look earlier")
     if rule.to_tick is not None and rule.to_tick <= first.tick:
-        what = f"the run begins at tick {first.tick}"
-        raise BadInput(file, f"--to {rule.to_tick}t", what, "look later")
+        reason = f"the run begins at tick {first.tick}"
+        raise BadInput(file, f"--to {rule.to_tick}t", reason, "look later")
 
 
 def extent(rule: CompareRule, periods: Sequence[Period]) -> str:

@@ -114,8 +114,8 @@ def replay(options: ReplayOptions) -> int:
     if job.origin:
         return _compare_with_twin(job, options)
     if options.compare.kind == "answers":
-        what = "is for robots at a port, and this was recorded at none"
-        raise BadInput(file, "--compare answers", what, "give --port, or another comparison")
+        reason = "is for robots at a port, and this was recorded at none"
+        raise BadInput(file, "--compare answers", reason, "give --port, or another comparison")
     if job.case.verdict or job.alone:
         return _replay_case(job, options)
     return _compare_with_recorded(job, images, options)
@@ -156,8 +156,8 @@ def _loaded(file: str, options: ReplayOptions) -> tuple[Job, list[Image]]:
     images = load_images(options.lines_from, job.image)
     checked_sources(options.sources)
     if options.expects and (options.desk.port or job.origin):
-        what = "is not for a robot at a port, of which only answers are known"
-        raise BadInput(file, "--expect", what, "leave it out: the answers are compared with the twin's")
+        reason = "is not for a robot at a port, of which only answers are known"
+        raise BadInput(file, "--expect", reason, "leave it out: the answers are compared with the twin's")
     return job, images
 
 
@@ -169,7 +169,7 @@ def _compare_with_recorded(job: Job, images: Sequence[Image], options: ReplayOpt
         check_reaches(rule, job.spec.origin, job.recorded)
     recorded = [period for period in job.recorded if to_tick is None or period.tick < to_tick]
     again = _rerun(job, to_tick, not options.shows)
-    found = compare_runs(
+    difference = compare_runs(
         ComparedRun(recorded, [job.as_recorded] if job.image and job.as_recorded else []),
         ComparedRun(again.periods, [job.spec]),
         replace(rule, digests=job.state == again.world.state.tables()),
@@ -182,26 +182,28 @@ def _compare_with_recorded(job: Job, images: Sequence[Image], options: ReplayOpt
     ended = len(again.periods) < len(recorded)
     if options.shows:
         show(*frame_tables(job, again.periods, options.everything, to_tick))
-        show(*difference_tables(found, options.everything))
+        show(*difference_tables(difference, options.everything))
     if not job.recorded and not compare.as_json:
         show(response_table(again.periods))
     complain(*result.texts)
     if options.shows and says_anything(job.spec.robot_scenario):
         show(expectations_text(result.expectations))
-    complain(*difference_lines(found, "the replay differs"), *found.notes)
-    if found.differences and options.shows:
-        show(debug_line(job.spec.origin, options.firmware, found.differences[0].tick))
-    elif ended and not found.differences:
+    complain(*difference_lines(difference, "the replay differs"), *difference.notes)
+    if difference.differences and options.shows:
+        show(debug_line(job.spec.origin, options.firmware, difference.differences[0].tick))
+    elif ended and not difference.differences:
         complain(f"the replay ended after {len(again.periods)} of {len(recorded)} recorded control periods")
-    elif recorded and not found.differences and not compare.as_json:
+    elif recorded and not difference.differences and not compare.as_json:
         show(f"the robots' response equals the recorded one in {extent(rule, again.periods)}")
-    differs = (found.differences or ended) and not options.expects
+    differs = (difference.differences or ended) and not options.expects
     code = exit_code(result.verdict, *(["differs"] if differs else []))
     if compare.as_json:
         firmware = {"recorded": job.image and job.image.sha256, "replayed": job.spec.image.sha256}
         periods = {"recorded": len(job.recorded), "replayed": len(again.periods)}
         head = {"file": job.spec.origin, "seed": job.spec.seed, "firmware": firmware, "periods": periods}
-        print_json({**head, **rule_as_json(rule), **found.as_json(options.everything), "exit_code": code})
+        print_json(
+            {**head, **rule_as_json(rule), **difference.as_json(options.everything), "exit_code": code}
+        )
     return code
 
 
@@ -251,15 +253,15 @@ def _compare_with_twin(job: Job, options: ReplayOptions) -> int:
     notes = [f"robot {slot} of the twin is not at the port: not compared" for slot in answers.silent]
     if answers.not_judged:
         notes.append(f"{answers.not_judged} values are not judged: they depend on times too near to a limit")
-    found = RunDifference(("robot", "twin"), answers.differences, notes=notes)
+    difference = RunDifference(("robot", "twin"), answers.differences, notes=notes)
     count = sum(map(len, answers.robots.values()))
-    code = exit_code("differs" if found.differences else "passed" if count else "not observable")
+    code = exit_code("differs" if difference.differences else "passed" if count else "not observable")
     if options.shows:
-        show(*difference_tables(found, options.everything))
-    complain(*found.notes, *difference_lines(found, "the robot differs from its twin"))
+        show(*difference_tables(difference, options.everything))
+    complain(*difference.notes, *difference_lines(difference, "the robot differs from its twin"))
     if not count:
         complain("no robot was asked, or none answered: nothing could be compared")
-    elif not found.differences and not compare.as_json:
+    elif not difference.differences and not compare.as_json:
         known = f"times are known to {answers.unsure_ms:.1f} ms"
         show(f"the robot answers as its twin does, {amount(count, 'time')}; {known}")
     if compare.as_json:
@@ -270,5 +272,5 @@ def _compare_with_twin(job: Job, options: ReplayOptions) -> int:
             "silent": answers.silent,
         }
         head["not_judged"] = answers.not_judged
-        print_json({**head, **found.as_json(options.everything), "exit_code": code})
+        print_json({**head, **difference.as_json(options.everything), "exit_code": code})
     return code

@@ -23,9 +23,9 @@ class SourceDifference(Record, frozen=True):
     b: str
 
 
-def source_differences(one: ComparedRun, other: ComparedRun) -> Iterator[SourceDifference]:
+def source_differences(first: ComparedRun, other: ComparedRun) -> Iterator[SourceDifference]:
     """Seed, firmware, and the keys of the scenario that differ, those that a scenario leaves out included."""
-    spec, other_spec = one.ways[0], other.ways[0]
+    spec, other_spec = first.ways[0], other.ways[0]
     if spec.seed != other_spec.seed:
         yield SourceDifference("seed", str(spec.seed), str(other_spec.seed))
     if spec.image.sha256 != other_spec.image.sha256:
@@ -38,19 +38,19 @@ def source_differences(one: ComparedRun, other: ComparedRun) -> Iterator[SourceD
         here, there = shown(keys.get(key)), shown(others.get(key))
         if here != there:
             yield SourceDifference(key, here, there)
-    if one.plugins != other.plugins:
-        yield SourceDifference("plug-ins", *("; ".join(run.plugins) or "none" for run in (one, other)))
-    if one.state and other.state and one.state != other.state:
-        yield SourceDifference("form of the state", one.state[:12], other.state[:12])
+    if first.plugins != other.plugins:
+        yield SourceDifference("plug-ins", *("; ".join(run.plugins) or "none" for run in (first, other)))
+    if first.state and other.state and first.state != other.state:
+        yield SourceDifference("form of the state", first.state[:12], other.state[:12])
 
 
-def _first_byte(one: Image, other: Image) -> SourceDifference:
-    places = [place for place, (a, b) in enumerate(zip(one.code, other.code, strict=False)) if a != b]
+def _first_byte(first: Image, other: Image) -> SourceDifference:
+    places = [place for place, (a, b) in enumerate(zip(first.code, other.code, strict=False)) if a != b]
     if not places:
         return SourceDifference("firmware code", "the same bytes", "the same bytes")
     where = (
         f"{image.code[places[0]]:02X}h at {places[0]:#06x} in {SymbolNames(image).place(places[0])}"
-        for image in (one, other)
+        for image in (first, other)
     )
     return SourceDifference(f"firmware code, the first of {amount(len(places), 'byte')}", *where)
 

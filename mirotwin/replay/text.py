@@ -29,27 +29,27 @@ LISTED = 5
 Names = tuple[str, str]
 
 
-def difference_lines(found: RunDifference, subject: str) -> Iterator[str]:
+def difference_lines(difference: RunDifference, subject: str) -> Iterator[str]:
     """Where `subject` differs first, and what was found by repeating both runs; the notes are not in it."""
-    if not found.differences:
+    if not difference.differences:
         return
-    yield f"{subject} in control period {found.period}, {found.differences[0].line(found.names)}"
-    if found.state is not None:
-        yield f"their states differ from {found.state} on"
-    if found.instruction is not None:
-        yield from _firmware_lines(found.instruction, found)
+    yield f"{subject} in control period {difference.period}, {difference.differences[0].line(difference.names)}"
+    if difference.state is not None:
+        yield f"their states differ from {difference.state} on"
+    if difference.instruction is not None:
+        yield from _firmware_lines(difference.instruction, difference)
 
 
-def difference_tables(found: RunDifference, everything: bool) -> Iterator[Table | str]:
+def difference_tables(difference: RunDifference, everything: bool) -> Iterator[Table | str]:
     """The first difference of each channel, or all of them."""
-    if not found.differences:
+    if not difference.differences:
         return
-    listed = first_per_channel(found.differences)
+    listed = first_per_channel(difference.differences)
     if everything:
-        listed = [(each, 1) for each in found.differences]
+        listed = [(each, 1) for each in difference.differences]
     table = plain_table("period", "tick", "t [s]", justify="right")
     table.add_column("channel", no_wrap=True)
-    for name in found.names:
+    for name in difference.names:
         table.add_column(name)
     if not everything:
         table.add_column("in all", justify="right")
@@ -57,8 +57,8 @@ def difference_tables(found: RunDifference, everything: bool) -> Iterator[Table 
         place = (str(each.period), str(each.tick), f"{each.tick / each.clock:.6f}", each.topic)
         table.add_row(*place, *each.values(), *([] if everything else [str(count)]))
     yield table
-    if len(listed) < len(found.differences):
-        yield f"{len(found.differences)} differences in {amount(len(listed), 'channel')}; --all lists them"
+    if len(listed) < len(difference.differences):
+        yield f"{len(difference.differences)} differences in {amount(len(listed), 'channel')}; --all lists them"
 
 
 def source_tables(origins: Sequence[SourceDifference], names: Names) -> Iterator[Table | str]:
@@ -71,45 +71,46 @@ def source_tables(origins: Sequence[SourceDifference], names: Names) -> Iterator
         yield ""
 
 
-def _firmware_lines(found: FirmwareDifference, runs: RunDifference) -> Iterator[str]:
-    for each in (found.changed, found.mapped):
+def _firmware_lines(difference: FirmwareDifference, runs: RunDifference) -> Iterator[str]:
+    for each in (difference.changed, difference.mapped):
         if each is not None:
             yield from _instruction_lines("the first changed instruction that is executed", each, runs)
-    if found.effect is not None and found.effect != found.changed:
-        yield from _instruction_lines("the states differ for good from here on", found.effect, runs)
-    if found.effect is not None and found.effect.parted is not None:
-        yield f"they go on at different places after {found.effect.parted}"
-    for variable in found.variables[:LISTED]:
+    if difference.effect is not None and difference.effect != difference.changed:
+        yield from _instruction_lines("the states differ for good from here on", difference.effect, runs)
+    if difference.effect is not None and difference.effect.parted is not None:
+        yield f"they go on at different places after {difference.effect.parted}"
+    for variable in difference.variables[:LISTED]:
         yield from _variable_lines(variable, runs)
-    if len(found.variables) > LISTED:
-        yield f"{len(found.variables) - LISTED} more variables differ; --json lists them"
-    yield from found.notes
+    if len(difference.variables) > LISTED:
+        yield f"{len(difference.variables) - LISTED} more variables differ; --json lists them"
+    yield from difference.notes
 
 
-def _instruction_lines(head: str, found: InstructionDifference, runs: RunDifference) -> Iterator[str]:
+def _instruction_lines(head: str, difference: InstructionDifference, runs: RunDifference) -> Iterator[str]:
     names = runs.names
-    yield f"{head}: {_place(found, runs)}{names[0]} {found.one}"
-    if (found.one.pc, found.one.text) != (found.other.pc, found.other.text):
-        yield f"  {names[1]} {found.other}"
+    yield f"{head}: {_place(difference, runs)}{names[0]} {difference.one}"
+    if (difference.one.pc, difference.one.text) != (difference.other.pc, difference.other.text):
+        yield f"  {names[1]} {difference.other}"
     values = [
-        f"{each.name}: {names[0]} {shown(each.one)}, {names[1]} {shown(each.other)}" for each in found.values
+        f"{each.name}: {names[0]} {shown(each.one)}, {names[1]} {shown(each.other)}"
+        for each in difference.values
     ]
     if values:
         more = f"; {len(values) - LISTED} more" if len(values) > LISTED else ""
         yield f"  after it {'; '.join(values[:LISTED])}{more}"
 
 
-def _variable_lines(found: VariableDifference, runs: RunDifference) -> Iterator[str]:
-    names, since = runs.names, moment(found.tick, found.clock)
-    values = f"{names[0]} {found.one}, {names[1]} {found.other}"
-    yield f"from {since} on {_place(found, runs)}{found.name} differs: {values}"
-    for name, writer in zip(names, found.writers, strict=True):
+def _variable_lines(difference: VariableDifference, runs: RunDifference) -> Iterator[str]:
+    names, since = runs.names, moment(difference.tick, difference.clock)
+    values = f"{names[0]} {difference.one}, {names[1]} {difference.other}"
+    yield f"from {since} on {_place(difference, runs)}{difference.name} differs: {values}"
+    for name, writer in zip(names, difference.writers, strict=True):
         if writer is not None:
             yield f"  {name}: written at {writer}"
 
 
-def _place(found: InstructionDifference | VariableDifference, runs: RunDifference) -> str:
-    return "" if runs.alone else f"net{found.network}/robot{found.slot}: "
+def _place(difference: InstructionDifference | VariableDifference, runs: RunDifference) -> str:
+    return "" if runs.alone else f"net{difference.network}/robot{difference.slot}: "
 
 
 SHOWN = 20
@@ -121,13 +122,13 @@ def frame_tables(
 ) -> Iterator[Table | str]:
     """The frames up to `to_tick` (None: all) that were recorded, of a stream those that were sent."""
     robots = {index: network.robots for index, network in enumerate(job.spec.robot_scenario.networks)}
-    found = sorted(
+    decoded = sorted(
         rows(transmissions_of(job.recorded or replayed), robots.__getitem__),
         key=lambda row: row.event.start_tick,
     )
     if to_tick is not None:
-        found = [row for row in found if row.event.start_tick < to_tick]
-    listed = found if everything else found[:SHOWN]
+        decoded = [row for row in decoded if row.event.start_tick < to_tick]
+    listed = decoded if everything else decoded[:SHOWN]
     table = plain_table("tick", "t [s]", justify="right")
     table.add_column("")
     table.add_column("from")
@@ -141,8 +142,8 @@ def frame_tables(
         tick = row.event.start_tick
         table.add_row(str(tick), f"{seconds(tick):.4f}", row.direction, sender, frame_text(row))
     yield table
-    if len(listed) < len(found):
-        yield f"{len(found) - len(listed)} more of {len(found)} frames; --all lists them"
+    if len(listed) < len(decoded):
+        yield f"{len(decoded) - len(listed)} more of {len(decoded)} frames; --all lists them"
 
 
 def response_table(replayed: Sequence[Period]) -> Table:
@@ -150,8 +151,8 @@ def response_table(replayed: Sequence[Period]) -> Table:
     names = ("robot", "accepted", "rejected", "stale", "commands", "left [counts]", "right [counts]")
     table = plain_table(*names, justify="right")
     for index, robot in enumerate(replayed[-1].robots):
-        seen = [period.robots[index] for period in replayed]
-        commands = sum(len(one.left.commands) + len(one.right.commands) for one in seen)
+        records = [period.robots[index] for period in replayed]
+        commands = sum(len(one.left.commands) + len(one.right.commands) for one in records)
         counters = [
             str(count) if count is not None else "?"
             for count in (robot.accepted, robot.rejected, robot.stale)

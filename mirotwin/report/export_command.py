@@ -31,8 +31,8 @@ from mirotwin.shell.verdicts import BAD_INPUT, DONE
 def export_foxglove(given: Input, format: str, out: str, quiet: bool) -> int:
     """Writes what `given` holds with Foxglove's topics to `out`; returns the exit code. Raises BadInput."""
     if format != "recording":
-        what = f"{NAMES[format]}, which holds no postures"
-        raise BadInput(given.label, "", what, "give a run.mcap that `mirotwin run` wrote")
+        reason = f"{NAMES[format]}, which holds no postures"
+        raise BadInput(given.label, "", reason, "give a run.mcap that `mirotwin run` wrote")
     from mirotwin.report.foxglove.convert import Conversion  # loads most of the package
 
     if given.size is not None:
@@ -70,13 +70,13 @@ class Exported:
 
     def __iter__(self) -> Iterator[Transmission]:
         try:
-            for one in self.sent:
-                self.networks.add(one.network)
-                if self.network in (None, one.network):
-                    self.down += one.direction == DOWN
-                    self.up += one.direction != DOWN
-                    self.bad_stops += len(one.bad_stop)
-                    yield one
+            for transmission in self.sent:
+                self.networks.add(transmission.network)
+                if self.network in (None, transmission.network):
+                    self.down += transmission.direction == DOWN
+                    self.up += transmission.direction != DOWN
+                    self.bad_stops += len(transmission.bad_stop)
+                    yield transmission
                 self.bar.to(self.given.position)
         except READ_ERRORS as error:
             if not self.down + self.up:

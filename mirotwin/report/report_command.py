@@ -117,8 +117,8 @@ def _file_of(subject: str) -> str:
     file = file_in(subject, (*RECORDINGS, *CASES))
     if not Path(file).is_dir():
         return file
-    what = f"holds neither {RECORDING} nor {CASES[0]}"
-    raise BadInput(subject, "", what, "give a run's folder, or that of one failed test")
+    reason = f"holds neither {RECORDING} nor {CASES[0]}"
+    raise BadInput(subject, "", reason, "give a run's folder, or that of one failed test")
 
 
 def _of_recording(wanted: ReportOptions, job: Job) -> Material:
@@ -132,7 +132,7 @@ def _of_recording(wanted: ReportOptions, job: Job) -> Material:
     again = run_again(job, end_tick, wanted.quiet)
     extras = extras_of(file, recorded[0].tick, end_tick, not wanted.no_frames)
     summary = _summary(Path(file), job.recorded[-1].digest)
-    notes, what = [], "This page's own run of it"
+    notes, replayed_run = [], "This page's own run of it"
     if extras.broken_off:
         count = amount(len(recorded), "control period")
         notes.append(f"This run was broken off: the page shows what it recorded, {count}.")
@@ -140,9 +140,9 @@ def _of_recording(wanted: ReportOptions, job: Job) -> Material:
         recorded = [period for period in again.periods if period.index in shown]
         extras = Extras(broken_off=extras.broken_off)  # frames and samples are of the recorded robot
         notes.append(_played_with(image, "recording", job.image))
-        what = f"Another firmware ({image.path.name})"
+        replayed_run = f"Another firmware ({image.path.name})"
     # the state of a controller is not computed again, so that digests of states say nothing here
-    found = differences(job.recorded[: len(again.periods)], again.periods, CompareRule(to_tick=end_tick))
+    changes = differences(job.recorded[: len(again.periods)], again.periods, CompareRule(to_tick=end_tick))
     return Material(
         kind="run",
         job=job,
@@ -152,8 +152,8 @@ def _of_recording(wanted: ReportOptions, job: Job) -> Material:
         command=_command(wanted, job),
         notes=notes,
         extras=extras,
-        replayed=what,
-        differences=found,
+        replayed=replayed_run,
+        differences=changes,
         steps=None if summary is None else summary.steps,
     )
 
@@ -206,9 +206,9 @@ def _summary(recording: Path, digest: str) -> Summary | None:
         path = recording.with_name(name)
         if path.is_file():
             try:
-                found = msgspec.json.decode(read_input(path), type=Summary)
+                summary = msgspec.json.decode(read_input(path), type=Summary)
             except (msgspec.DecodeError, BadInput):
                 continue
-            if found.digest == digest:
-                return found
+            if summary.digest == digest:
+                return summary
     return None

@@ -154,14 +154,14 @@ class _Axes:
         bottom, made = box.y + box.height, []
         closer = 0.6 if panel.small else 1.0
         for value, text in ticks(self.x0, self.x1, box.width / PER_LABEL_X / closer):
-            at = self.x(value)
-            made.append(f'<path class="grid" d="M{at:.1f} {box.y:.1f}V{bottom:.1f}"/>')
+            position = self.x(value)
+            made.append(f'<path class="grid" d="M{position:.1f} {box.y:.1f}V{bottom:.1f}"/>')
             if not panel.small:
-                made.append(_text(at, bottom + 16, text, "mid", sub=False))
+                made.append(_text(position, bottom + 16, text, "mid", sub=False))
         for value, text in ticks(self.y0, self.y1, box.height / PER_LABEL_Y / closer):
-            at = self.y(value)
-            made.append(f'<path class="grid" d="M{box.x:.1f} {at:.1f}h{box.width:.1f}"/>')
-            made.append(_text(box.x - 6, at + 4, text, "end", sub=False))
+            position = self.y(value)
+            made.append(f'<path class="grid" d="M{box.x:.1f} {position:.1f}h{box.width:.1f}"/>')
+            made.append(_text(box.x - 6, position + 4, text, "end", sub=False))
         if panel.x_label:
             made.append(_text(box.x + box.width / 2, bottom + 33, panel.x_label, "mid"))
         if panel.y_label:
@@ -174,8 +174,8 @@ class _Axes:
         for mark in self.panel.marks:
             colour = f"stroke:var(--c{mark.colour})"
             if mark.style == "start":
-                at = f'cx="{self.x(mark.x[0]):.1f}" cy="{self.y(mark.y[0]):.1f}"'
-                made.append(f'<circle class="start" style="{colour}" {at} r="4"/>')
+                centre = f'cx="{self.x(mark.x[0]):.1f}" cy="{self.y(mark.y[0]):.1f}"'
+                made.append(f'<circle class="start" style="{colour}" {centre} r="4"/>')
             elif len(mark.x):
                 dots = mark.style == "dots"
                 made.append(f'<path class="{mark.style}" style="{colour}" d="{self._path(mark, dots)}"/>')

@@ -56,8 +56,8 @@ def checks_alone(expected: Sequence[str]) -> list[Check]:
     """The checks that --expect names and that can judge a board alone. Raises BadInput."""
     if not expected:  # which would forget the checks of files
         return []
-    found = checks_of_table(BoardScenario(), "", "expect", table_alone(expected, "fuzz")).values()
-    return [check for check in found if check is not None and "board" in check.SUBJECTS]
+    checks = checks_of_table(BoardScenario(), "", "expect", table_alone(expected, "fuzz")).values()
+    return [check for check in checks if check is not None and "board" in check.SUBJECTS]
 
 
 def in_files(expected: Sequence[str]) -> dict[str, str]:

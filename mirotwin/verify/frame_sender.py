@@ -29,8 +29,8 @@ class FrameSender:
         """The next number that asks the robot in `slot`. Raises ValueError where that is not fresh any more."""
         step = asking_step(self.seq, slot, self.robots)
         if step > FRESH_STEPS:
-            what = f"no number that is fresh after {self.seq} asks robot {slot}"
-            raise ValueError(f"{what}: 64 is not a multiple of {self.robots}; send a team frame before")
+            reason = f"no number that is fresh after {self.seq} asks robot {slot}"
+            raise ValueError(f"{reason}: 64 is not a multiple of {self.robots}; send a team frame before")
         return (self.seq + step) % SEQ_MODULUS
 
     def team(self, ask: bool, seq: int | None = None, velocities: Sequence[Pair] | None = None) -> TeamFrame:

@@ -62,8 +62,8 @@ def _converges(rows: Sequence[RunRow]) -> str:
 
 
 def _error(rows: Sequence[RunRow]) -> str:
-    found = settled(rows)
-    return f"{number(middle(found, 'rms_position_cm'))} cm; {len(found)} of {len(rows)} runs"
+    settled_rows = settled(rows)
+    return f"{number(middle(settled_rows, 'rms_position_cm'))} cm; {len(settled_rows)} of {len(rows)} runs"
 
 
 def _of_cases(cases: Sequence[bool | None], some: str = PART) -> str:

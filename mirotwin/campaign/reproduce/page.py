@@ -77,8 +77,8 @@ def _table(names: Sequence[str], rows: Iterable[Sequence[str]]) -> Iterator[str]
 
 def _claims(table: Table) -> Iterator[str]:
     yield "## What the paper claims, and what was measured\n"
-    found = [(*words, f"**{verdict}**") for *words, verdict in map(astuple, findings(table))]
-    yield from _table(("figure", "claim", "criterion", "measured", ""), found)
+    rows = [(*words, f"**{verdict}**") for *words, verdict in map(astuple, findings(table))]
+    yield from _table(("figure", "claim", "criterion", "measured", ""), rows)
 
 
 ERRORS = {"in truth": "rms_position_cm", "as the camera sees it": "seen_position_cm"}
@@ -89,10 +89,12 @@ def _better(table: Table) -> Iterator[str]:
     yield "## Which of the two laws is better\n"
     rows, counts = [], []
     for error, name in ERRORS.items():
-        found = [compared(table, start.figure, RETUNED, name) for start in STARTS]
-        cases = [case for _, case in found if case is not None]
+        comparisons = [compared(table, start.figure, RETUNED, name) for start in STARTS]
+        cases = [case for _, case in comparisons if case is not None]
         counts.append(f"from {cases.count(True)} of {len(cases)} starts {error}")
-        rows.append((f"{error}, runs that settle", *(text.replace(" beside ", " / ") for text, _ in found)))
+        rows.append(
+            (f"{error}, runs that settle", *(text.replace(" beside ", " / ") for text, _ in comparisons))
+        )
         groups = [[rows_of(table, start.figure, one) for one in (PAPER, RETUNED)] for start in STARTS]
         cells = (" / ".join(number(middle(one, name)) for one in pair) for pair in groups)
         rows.append((f"{error}, all runs", *cells))
@@ -128,12 +130,12 @@ def _figures(table: Table, folder: str) -> Iterator[str]:
         errors = f"({start.x_cm:.2f} cm, {start.y_cm:.2f} cm, {start.theta_rad:.2f} rad)"
         yield f"### Fig. {start.figure}: {start.path}, initial errors {errors}\n"
         yield f"![Fig. {start.figure}: in truth, and as the camera sees it]({folder}/{start.name}.svg)\n"
-        found = []
+        lines = []
         for controller in CONTROLLERS:
             if rows := rows_of(table, start.figure, controller):
                 cells = (cell(rows) for cell in COLUMNS.values())
-                found.append((NAMES.get(controller, controller), *cells))
-        yield from _table(("controller", *COLUMNS), found)
+                lines.append((NAMES.get(controller, controller), *cells))
+        yield from _table(("controller", *COLUMNS), lines)
 
 
 def _error(rows: Sequence[RunRow]) -> str:
@@ -144,11 +146,11 @@ def _error(rows: Sequence[RunRow]) -> str:
 def _cameras(table: Table) -> Iterator[str]:
     yield "## What the camera decides\n"
     yield "Error in truth in cm, median / 95 %. `1997`: a calibration wrong by up to 2.40 cm, drawn once a seed.\n"
-    found = []
+    rows = []
     for camera, controller in (*product((*CAMERAS, ""), (PAPER, IMPROVED)), ("", LEARNING)):
         cells = [_error(rows_of(table, figure, controller, camera)) for figure in FIGURES.values()]
-        found.append((camera or "pixels, 1997", NAMES[controller], *cells))
-    yield from _table(("camera", "controller", *FIGURES), found)
+        rows.append((camera or "pixels, 1997", NAMES[controller], *cells))
+    yield from _table(("camera", "controller", *FIGURES), rows)
 
 
 def _disturbances(table: Table) -> Iterator[str]:
@@ -157,9 +159,9 @@ def _disturbances(table: Table) -> Iterator[str]:
         "The paper's law with what section V-A calls integration error and noise in the control signal, whose bounds it"
         " does not give.\nError in truth in cm of all runs, median / 95 %, and the runs that do not settle.\n"
     )
-    found = []
+    lines = []
     for disturbance in ("", *DISTURBANCES):
         groups = [rows_of(table, figure, PAPER, "", disturbance) for figure in FIGURES.values()]
         cells = [f"{_error(rows)} ({COLUMNS['not settled'](rows)})" for rows in groups]
-        found.append((disturbance or "none: Euler's rule, words of 16 bits, no noise", *cells))
-    yield from _table(("disturbance", *FIGURES), found)
+        lines.append((disturbance or "none: Euler's rule, words of 16 bits, no noise", *cells))
+    yield from _table(("disturbance", *FIGURES), lines)

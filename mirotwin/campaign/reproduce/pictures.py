@@ -51,13 +51,13 @@ def draw(path: Path, title: str, tracks: Mapping[str, RobotTrack]) -> None:
     drawing.write(path)
 
 
-def _path_panel(tracks: Mapping[str, RobotTrack], seen: bool) -> Panel:
-    panel = Panel(f"(a)  x-y, {SIDES[seen]}", "x [cm]", "y [cm]", equal=True)
+def _path_panel(tracks: Mapping[str, RobotTrack], measured: bool) -> Panel:
+    panel = Panel(f"(a)  x-y, {SIDES[measured]}", "x [cm]", "y [cm]", equal=True)
     x_cm, y_cm = next(iter(tracks.values())).reference.points_cm()
-    panel.line(x_cm, y_cm, colour=0, style="thin dotted", label="" if seen else "reference")
+    panel.line(x_cm, y_cm, colour=0, style="thin dotted", label="" if measured else "reference")
     for colour, (name, track) in enumerate(tracks.items(), start=1):
-        x_cm, y_cm = (track.measured if seen else track.truth).points_cm()
-        panel.line(x_cm, y_cm, colour=colour, style="thin", label="" if seen else name)
+        x_cm, y_cm = (track.measured if measured else track.truth).points_cm()
+        panel.line(x_cm, y_cm, colour=colour, style="thin", label="" if measured else name)
     return panel
 
 

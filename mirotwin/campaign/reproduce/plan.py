@@ -153,10 +153,10 @@ def recorded(plan: Plan, seeds: Mapping[str, int], place: Callable[[str], str]) 
 
     `place`: the file for a recording, by its name.
     """
-    found = []
+    jobs = []
     for index, group in enumerate(GROUPS):
         if group.label in seeds:
             run = index * plan.design.seed_count + seeds[group.label] - plan.design.first_seed
             text, path = source_text(group.scenario()[0]), place(group.recording)
-            found.append(msgspec.structs.replace(plan.work(run), text=text, recording=path))
-    return found
+            jobs.append(msgspec.structs.replace(plan.work(run), text=text, recording=path))
+    return jobs

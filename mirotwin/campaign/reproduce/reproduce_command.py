@@ -76,22 +76,22 @@ def reproduce(options: ReproduceOptions) -> int:
         told_when_full(out / FOLDER, "--out"),
     ):
         folder.keep = (ROWS,)
-        found = _run(plan, workers, folder.part(ROWS), hold, quiet)
-        shown = middle_seeds(by_label(found))
+        rows = _run(plan, workers, folder.part(ROWS), hold, quiet)
+        shown = middle_seeds(by_label(rows))
         jobs = recorded(plan, shown, lambda name: str(folder.part(name)))
         _record(jobs, workers, folder, hold, quiet)
         for start in STARTS:
             _draw(start, folder, shown)
-        text = page(by_label(found), f"{seeds[0]} to {seeds[-1]}", FOLDER)
+        text = page(by_label(rows), f"{seeds[0]} to {seeds[-1]}", FOLDER)
         page_path.write_text(text, encoding="utf-8")
     if not quiet:
-        show_line(f"{amount(len(found), 'run')} in {time.monotonic() - began_s:.0f} s: {out / PAGE}")
-    return _failures(found)
+        show_line(f"{amount(len(rows), 'run')} in {time.monotonic() - began_s:.0f} s: {out / PAGE}")
+    return _failures(rows)
 
 
 def _run(plan: Plan, workers: Workers, path: Path, hold: Hold, quiet: bool) -> list[RunRow]:
     """All rows, each in the file as soon as it is there."""
-    found: list[RunRow] = []
+    rows: list[RunRow] = []
     names = [field.name for field in msgspec.structs.fields(RunRow)]
     with (
         path.open("w", newline="", encoding="utf-8") as stream,
@@ -101,11 +101,11 @@ def _run(plan: Plan, workers: Workers, path: Path, hold: Hold, quiet: bool) -> l
         writer.writerow(names)
         with hold.released():
             for outcome in outcomes_of([plan.work(run) for run in range(plan.runs)], workers):
-                found.append(row_of(plan, outcome))
-                writer.writerow(msgspec.structs.astuple(found[-1]))
+                rows.append(row_of(plan, outcome))
+                writer.writerow(msgspec.structs.astuple(rows[-1]))
                 stream.flush()
-                bar.to(len(found))
-    return found
+                bar.to(len(rows))
+    return rows
 
 
 def _record(jobs: Sequence[Work], workers: Workers, folder: OutputFolder, hold: Hold, quiet: bool) -> None:
@@ -141,12 +141,12 @@ def _draw(start: Start, folder: OutputFolder, seeds: Mapping[str, int]) -> None:
     draw(folder.part(f"{start.name}.svg"), title, tracks)
 
 
-def _failures(found: Sequence[RunRow]) -> int:
-    failed = [row for row in found if row.error]
+def _failures(rows: Sequence[RunRow]) -> int:
+    failed = [row for row in rows if row.error]
     for row in failed[:5]:
         complain(f"{row.label}, seed {row.seed}: {row.error}")
     if failed:
-        complain(f"{len(failed)} of {len(found)} runs failed; {ROWS} says which")
-    if faults := sum(row.faults for row in found):
+        complain(f"{len(failed)} of {len(rows)} runs failed; {ROWS} says which")
+    if faults := sum(row.faults for row in rows):
         complain(f"{faults} firmware faults; rows.csv says in which runs")
     return exit_code("error" if failed else "fault" if faults else "passed")

@@ -54,9 +54,9 @@ def row_of(plan: Plan, outcome: RunOutcome) -> RunRow:
     point = plan.design.point(outcome.run)
     (level,) = point.levels
     figures = {name: outcome.figures.get(_COLUMNS.get(name, name)) for name in RunRow.__struct_fields__}
-    found: dict[str, Any] = {name: figure for name, figure in figures.items() if figure is not None}
+    columns: dict[str, Any] = {name: figure for name, figure in figures.items() if figure is not None}
     return RunRow(
-        f"{level.value}", level.scenario, point.seed, error=outcome.error, digest=outcome.digest, **found
+        f"{level.value}", level.scenario, point.seed, error=outcome.error, digest=outcome.digest, **columns
     )
 
 
@@ -66,10 +66,10 @@ Table = Mapping[str, Sequence[RunRow]]
 
 def by_label(rows: Iterable[RunRow]) -> dict[str, list[RunRow]]:
     """Groups in the order in which they come."""
-    found: dict[str, list[RunRow]] = {}
+    labelled: dict[str, list[RunRow]] = {}
     for row in rows:
-        found.setdefault(row.label, []).append(row)
-    return found
+        labelled.setdefault(row.label, []).append(row)
+    return labelled
 
 
 def values(rows: Sequence[RunRow], name: str) -> list[float]:
@@ -79,25 +79,25 @@ def values(rows: Sequence[RunRow], name: str) -> list[float]:
 
 def middle(rows: Sequence[RunRow], name: str) -> float | None:
     """The median, None where no row has it."""
-    found = values(rows, name)
-    return median(found) if found else None
+    numbers = values(rows, name)
+    return median(numbers) if numbers else None
 
 
 def percentile(rows: Sequence[RunRow], name: str, share: float) -> float | None:
     """The smallest value that so large a share of the rows does not exceed (nearest rank)."""
-    found = sorted(values(rows, name))
-    rank = -(-len(found) * round(share * 1000) // 1000)
-    return found[max(rank, 1) - 1] if found else None
+    numbers = sorted(values(rows, name))
+    rank = -(-len(numbers) * round(share * 1000) // 1000)
+    return numbers[max(rank, 1) - 1] if numbers else None
 
 
 def middle_seeds(table: Table) -> dict[str, int]:
     """Of each group the seed whose error is the median (of an even number, the lower one); none, if all failed."""
-    found = {}
+    middles = {}
     for label, rows in table.items():
         ordered = sorted((row.rms_position_cm, row.seed) for row in rows if row.rms_position_cm is not None)
         if ordered:
-            found[label] = ordered[(len(ordered) - 1) // 2][1]
-    return found
+            middles[label] = ordered[(len(ordered) - 1) // 2][1]
+    return middles
 
 
 def never_settled(rows: Sequence[RunRow]) -> int:

@@ -40,10 +40,10 @@ def chapter_of(rule: Rule) -> Chapter:
 @cache
 def presupposed(rule: Rule) -> tuple[Rule, ...]:
     """All rules that `rule` presupposes, also by way of others: each after those that it presupposes itself."""
-    found: dict[str, Rule] = {}
-    for one in map(find, rule.presupposes):
-        found |= {other.id: other for other in (*presupposed(one), one)}
-    return tuple(found.values())
+    earlier: dict[str, Rule] = {}
+    for presupposition in map(find, rule.presupposes):
+        earlier |= {other.id: other for other in (*presupposed(presupposition), presupposition)}
+    return tuple(earlier.values())
 
 
 def presupposed_first(rules: Sequence[Rule]) -> list[Rule]:
@@ -58,17 +58,17 @@ def presupposed_first(rules: Sequence[Rule]) -> list[Rule]:
 def spans(ids: Sequence[str]) -> str:
     """`P01 to P03, P05`, in the order of the rules."""
     places = [place for place, rule in enumerate(ALL) if rule.id in ids]
-    found = []
+    parts = []
     for _, numbered in groupby(enumerate(places), key=lambda one: one[1] - one[0]):
         span = [ALL[place].id for _, place in numbered]
-        found.append(" to ".join(dict.fromkeys((span[0], span[-1]))))
-    return ", ".join(found)
+        parts.append(" to ".join(dict.fromkeys((span[0], span[-1]))))
+    return ", ".join(parts)
 
 
 def find(id: str) -> Rule:
     """The rule called `id`, in capitals or not. Raises BadInput, with the nearest one that there is."""
-    found = _BY_ID.get(id.upper())
-    if found is not None:
-        return found
+    rule = _BY_ID.get(id.upper())
+    if rule is not None:
+        return rule
     remedy = f"`mirotwin conform --list` shows {ALL[0].id} to {ALL[-1].id}"
     raise BadInput("", "", f"there is no rule {id[:40]!r}", did_you_mean(id.upper(), _BY_ID, remedy))

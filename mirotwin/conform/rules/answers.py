@@ -38,11 +38,11 @@ def in_turn(script: TrialScript) -> None:
     script.seq = 59
     for _ in range(10):  # over the wrap of seq, where some robot's turn comes early
         question = script.team(ask=True, gap_ms=36.0)
-        asked = question.seq % script.n
-        if asked in script.topology.slots:
+        addressed = question.seq % script.n
+        if addressed in script.topology.slots:
             script.answered(question)
         else:
-            script.silent(question.last_tick, over_by(question), f"{question.what} is for robot {asked}")
+            script.silent(question.last_tick, over_by(question), f"{question.what} is for robot {addressed}")
 
 
 @CHAPTER.rule("P42", FRAME, presupposes="P16", broken="an answer is not well formed")
@@ -67,25 +67,27 @@ def _formed(script: TrialScript, question: Frame, then_more: bool = False) -> No
 
     @script.expects(until, wanted)
     def test(observed: Observed) -> Found:
-        heard: Sequence[Event] = within(observed.heard, question.last_tick, until)
-        heard = heard[: TELEMETRY.wire_size] if then_more else in_a_row(heard)
-        if heard and (what := _badly_formed(heard, question, observed)):
-            yield heard[-1].tick, f"{characters(heard)}: {what}"
+        received: Sequence[Event] = within(observed.heard, question.last_tick, until)
+        received = received[: TELEMETRY.wire_size] if then_more else in_a_row(received)
+        if received and (reason := _badly_formed(received, question, observed)):
+            yield received[-1].tick, f"{characters(received)}: {reason}"
 
 
-def _badly_formed(heard: Sequence[Event], question: Frame, observed: Observed) -> str:
-    if len(heard) != TELEMETRY.wire_size:
-        return f"{len(heard)} without a pause"
-    found = bytes(one.value for one in heard)[: len(_HEAD)]
-    if found != _HEAD:
-        return f"{found.hex(' ')} first"
-    if not all(one.good_stop for one in heard):
+def _badly_formed(received: Sequence[Event], question: Frame, observed: Observed) -> str:
+    if len(received) != TELEMETRY.wire_size:
+        return f"{len(received)} without a pause"
+    head = bytes(one.value for one in received)[: len(_HEAD)]
+    if head != _HEAD:
+        return f"{head.hex(' ')} first"
+    if not all(one.good_stop for one in received):
         return "a bad stop bit"
-    baud = BITS_PER_CHARACTER * TICKS_PER_SECOND * (len(heard) - 1) / (heard[-1].tick - heard[0].tick)
+    baud = (
+        BITS_PER_CHARACTER * TICKS_PER_SECOND * (len(received) - 1) / (received[-1].tick - received[0].tick)
+    )
     if abs(baud - BAUD) > BAUD_TOLERANCE * BAUD:
         return f"{baud:.0f} baud"
-    if not within(observed.answers, heard[0].tick - 1, heard[-1].tick):
-        return no_answer(heard, question.seq)
+    if not within(observed.answers, received[0].tick - 1, received[-1].tick):
+        return no_answer(received, question.seq)
     return ""
 
 
@@ -167,7 +169,7 @@ def _says_flags(script: TrialScript, wanted: int, since: str = "") -> None:
 
 def flagged(wanted: int, among: int = 0xFF) -> Says:
     """Among these flags those are set that are `wanted`."""
-    return lambda said, *_: "" if said.flags & among == wanted else f"{said.flags:02X}h"
+    return lambda content, *_: "" if content.flags & among == wanted else f"{content.flags:02X}h"
 
 
 @CHAPTER.rule("P46", FRAME, presupposes="P35 P41")
@@ -193,16 +195,16 @@ def _run_away(script: TrialScript) -> None:
         script.team(script.same(16000, 50), gap_ms=30.0)
 
 
-def _status(said: TelemetryFrame, answer: ReceivedAnswer, observed: Observed) -> str:
+def _status(content: TelemetryFrame, answer: ReceivedAnswer, observed: Observed) -> str:
     before, after = _around(answer, observed)
     left, right = (before.left.status, after.left.status), (before.right.status, after.right.status)
-    for side, (one, other), others, found in (
-        ("left", left, right, said.status_left),
-        ("right", right, left, said.status_right),
+    for side, (earlier, other), others, shown in (
+        ("left", left, right, content.status_left),
+        ("right", right, left, content.status_right),
     ):
-        if one == other != found:
-            more = ": that is the other one's" if others == (found, found) else ""
-            return f"{found:02X}h and not {one:02X}h of the {side} one{more}"
+        if earlier == other != shown:
+            more = ": that is the other one's" if others == (shown, shown) else ""
+            return f"{shown:02X}h and not {earlier:02X}h of the {side} one{more}"
     return ""
 
 
@@ -238,32 +240,34 @@ def _stands(script: TrialScript) -> None:
     script.answered(question, f"the real positions in the answer to {question.what}", _positions)
 
 
-def _positions(said: TelemetryFrame, answer: ReceivedAnswer, observed: Observed) -> str:
+def _positions(content: TelemetryFrame, answer: ReceivedAnswer, observed: Observed) -> str:
     before, after = _around(answer, observed)
     left = (before.left.real_position, after.left.real_position)
     right = (before.right.real_position, after.right.real_position)
-    for side, ends, others, found in (
-        ("left", left, right, said.position_left),
-        ("right", right, left, said.position_right),
+    for side, ends, others, position in (
+        ("left", left, right, content.position_left),
+        ("right", right, left, content.position_right),
     ):
-        if not _within(found, ends):
-            one, other = (number(end & 0xFFFF) for end in ends)
-            where = f"{number(found)} of the {side} wheel, which went from {one} to {other}"
-            if _within(found >> 8 | (found & 0xFF) << 8, ends):
+        if not _within(position, ends):
+            first, other = (number(end & 0xFFFF) for end in ends)
+            where = f"{number(position)} of the {side} wheel, which went from {first} to {other}"
+            if _within(position >> 8 | (position & 0xFF) << 8, ends):
                 return f"{where}: its bytes are exchanged"
-            return f"{where}: that is the other wheel's" if _within(found, others) else where
+            return f"{where}: that is the other wheel's" if _within(position, others) else where
     return ""
 
 
-def _read_at_once(said: TelemetryFrame, answer: ReceivedAnswer, observed: Observed) -> str:
+def _read_at_once(content: TelemetryFrame, answer: ReceivedAnswer, observed: Observed) -> str:
     """Each position is the low word of what one RDRP read; a robot that reads no RDRP is not judged by this."""
-    for side, found in (("left", said.position_left), ("right", said.position_right)):
+    for side, position in (("left", content.position_left), ("right", content.position_right)):
         read = observed.read_positions(side, answer.frame.start_tick - ms(14.0), answer.tick)
-        if read and found not in read:
-            where = f"{number(found)} of the {side} wheel, of which {', '.join(map(number, read))} was read"
-            mixed = any(found in (one & 0xFF00 | other & 0xFF, one) for one in read for other in read)
+        if read and position not in read:
+            where = (
+                f"{number(position)} of the {side} wheel, of which {', '.join(map(number, read))} was read"
+            )
+            mixed = any(position in (one & 0xFF00 | other & 0xFF, one) for one in read for other in read)
             return f"{where}: its bytes are of two samples" if mixed else where
-    return _positions(said, answer, observed)
+    return _positions(content, answer, observed)
 
 
 def _within(position: int, ends: tuple[int, int]) -> bool:
@@ -292,9 +296,9 @@ def accepted(script: TrialScript) -> None:
 
 
 def _counts(script: TrialScript, name: str, count: int) -> None:
-    def wrong(said: TelemetryFrame, *_: object) -> str:
-        found = int(getattr(said, name))
-        return "" if found == count % 256 else number(found, 2)
+    def wrong(content: TelemetryFrame, *_: object) -> str:
+        value = int(getattr(content, name))
+        return "" if value == count % 256 else number(value, 2)
 
     _says(script, f"{name} {number(count % 256, 2)}", wrong)
 

@@ -43,9 +43,9 @@ def reset_together(script: TrialScript) -> None:
 
     @script.expects(first.tick, "RSTI 0000h")
     def other_mask(observed: Observed) -> Found:
-        for one in observed.commands:
-            if one.tick <= first.tick and one.opcode == _RSTI and one.data != bytes(2):
-                yield one.tick, f"RSTI {one.data.hex()} to the {one.side} one"
+        for command in observed.commands:
+            if command.tick <= first.tick and command.opcode == _RSTI and command.data != bytes(2):
+                yield command.tick, f"RSTI {command.data.hex()} to the {command.side} one"
 
     @script.expects(end, "RESET sent to both LM629 or none")
     def alone(observed: Observed) -> Found:

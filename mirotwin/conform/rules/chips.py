@@ -63,7 +63,7 @@ def _tells_of_them(script: TrialScript) -> None:
                 yield tick, f"the {side} one driven"
 
 
-def _free(said: TelemetryFrame, answer: ReceivedAnswer, observed: Observed) -> str:
-    if said.status_left & _BUSY or said.status_right & _BUSY:
-        return f"status {said.status_left:02X}h and {said.status_right:02X}h, read while busy (01h)"
-    return flagged(0, Flags.INIT_FAILED)(said, answer, observed)
+def _free(content: TelemetryFrame, answer: ReceivedAnswer, observed: Observed) -> str:
+    if content.status_left & _BUSY or content.status_right & _BUSY:
+        return f"status {content.status_left:02X}h and {content.status_right:02X}h, read while busy (01h)"
+    return flagged(0, Flags.INIT_FAILED)(content, answer, observed)

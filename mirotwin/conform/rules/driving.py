@@ -118,15 +118,16 @@ def kept(script: TrialScript) -> None:
 
 
 def _why_not_reached(observed: Observed, tick: int) -> str:
-    told = observed.both_told(tick)
-    if not all(order.moves for order in told):
+    orders = observed.both_told(tick)
+    if not all(order.moves for order in orders):
         return ""
-    if not all(order.acceleration for order in told):
+    if not all(order.acceleration for order in orders):
         return ": an acceleration of 0 is loaded"
     begun = next(order.tick for order in observed.ordered(0, tick) if order.moves)
-    for one in observed.wrote(begun, tick):
-        if one.opcode == _LTRJ and one.data[1] & _ACCELERATION:
-            return f": at tick {one.tick} an acceleration was loaded in motion, {one.side} LTRJ {one.data.hex(' ')}"
+    for command in observed.wrote(begun, tick):
+        if command.opcode == _LTRJ and command.data[1] & _ACCELERATION:
+            loaded = f"{command.side} LTRJ {command.data.hex(' ')}"
+            return f": at tick {command.tick} an acceleration was loaded in motion, {loaded}"
     return ""
 
 
@@ -139,6 +140,6 @@ def _reached(script: TrialScript, frame: Frame) -> None:
     def test(observed: Observed) -> Found:
         wanted = frame.for_robot(observed.slot)
         for tick, record in observed.periods:
-            found = (record.left.desired_velocity / 256, record.right.desired_velocity / 256)
-            if after_tick <= tick <= until_tick and found != wanted:
-                yield tick, f"{found[0]:g}, {found[1]:g}{_why_not_reached(observed, tick)}"
+            velocities = (record.left.desired_velocity / 256, record.right.desired_velocity / 256)
+            if after_tick <= tick <= until_tick and velocities != wanted:
+                yield tick, f"{velocities[0]:g}, {velocities[1]:g}{_why_not_reached(observed, tick)}"

@@ -158,15 +158,15 @@ def _turning(script: TrialScript, frame: Frame) -> None:
 
     @script.expects(until, f"wheels that turn as by {frame.what}")
     def test(observed: Observed) -> Found:
-        *_, one, other = (record for tick, record in observed.periods if tick <= until)
-        left = other.left.real_position - one.left.real_position
-        right = other.right.real_position - one.right.real_position
+        *_, earlier, other = (record for tick, record in observed.periods if tick <= until)
+        left = other.left.real_position - earlier.left.real_position
+        right = other.right.real_position - earlier.right.real_position
         for side, moved, word in zip(SIDES, (left, right), frame.for_robot(observed.slot), strict=True):
             nominal = word * CONTROL_PERIOD_TICKS / SAMPLE_TICKS / 256
             if abs(moved - nominal) > abs(nominal) / 2:
-                found = f"{moved} counts of the {side} one in a camera frame and not about {nominal:.0f}"
+                reason = f"{moved} counts of the {side} one in a camera frame and not about {nominal:.0f}"
                 loaded = observed.set_to(side, until)
-                yield until, found + ("" if loaded else ": no filter was loaded into its LM629 (LFIL, UDF)")
+                yield until, reason + ("" if loaded else ": no filter was loaded into its LM629 (LFIL, UDF)")
 
 
 def stops_behind(script: TrialScript, last: Frame) -> None:

@@ -55,5 +55,5 @@ def _told_in_vain(script: TrialScript, left: int, right: int) -> Frame:
     return first
 
 
-def _shows_error(said: TelemetryFrame, answer: ReceivedAnswer, observed: Observed) -> str:
-    return "" if said.status_left & _POSITION_ERROR else f"{said.status_left:02X}h"
+def _shows_error(content: TelemetryFrame, answer: ReceivedAnswer, observed: Observed) -> str:
+    return "" if content.status_left & _POSITION_ERROR else f"{content.status_left:02X}h"

@@ -104,8 +104,11 @@ def wrong_bits(script: TrialScript) -> None:
 def _wrong_bits(script: TrialScript) -> Iterator[tuple[str, How]]:
     """One wrong bit in each character, then samples of two to four."""
     characters = range(2, script.form.size)
-    for at in characters:
-        yield f"frame with a wrong bit in character {at}", How(wrong={at: 1 << at * 3 % 8})
+    for character in characters:
+        yield (
+            f"frame with a wrong bit in character {character}",
+            How(wrong={character: 1 << character * 3 % 8}),
+        )
     draw = 0
     for count in (2, 3, 4):
         for _ in range(8):
@@ -114,9 +117,9 @@ def _wrong_bits(script: TrialScript) -> Iterator[tuple[str, How]]:
             while bits < count:
                 place = int(_CHANCE.uniform(draw) * 8 * len(characters))
                 draw += 1
-                at, bit = 2 + place // 8, 1 << place % 8
-                if not wrong.get(at, 0) & bit:
-                    wrong[at] = wrong.get(at, 0) | bit
+                character, bit = 2 + place // 8, 1 << place % 8
+                if not wrong.get(character, 0) & bit:
+                    wrong[character] = wrong.get(character, 0) | bit
                     bits += 1
             where = ", ".join(map(str, sorted(wrong)))
             yield f"frame with {count} wrong bits in characters {where}", How(wrong=wrong)
@@ -160,9 +163,9 @@ def short_pauses(script: TrialScript) -> None:
         what = f"team frame with {SHORTEST_US:g} us before"
         everywhere = dict.fromkeys(places, SHORTEST_US)
         script.obeyed(script.team(what=f"{what} each character", pauses=everywhere))
-        for at in places:
-            pauses = {at: SHORTEST_US}
-            script.obeyed(script.team(what=f"{what} character {at}", lead=b"", pauses=pauses))
+        for place in places:
+            pauses = {place: SHORTEST_US}
+            script.obeyed(script.team(what=f"{what} character {place}", lead=b"", pauses=pauses))
 
 
 @CHAPTER.rule("P12", RECEPTION, presupposes="P14 P16")

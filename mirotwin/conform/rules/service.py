@@ -49,9 +49,9 @@ def _filter_taken(
     @script.expects(frame.acted_tick, f"{wanted}{_listed(words)} in force after {frame.what}", slots)
     def test(observed: Observed) -> Found:
         for side in SIDES:
-            found = observed.set_to(side, frame.acted_tick)
-            if found != words:
-                yield frame.acted_tick, f"{_listed(found)} in the {side} one"
+            taken = observed.set_to(side, frame.acted_tick)
+            if taken != words:
+                yield frame.acted_tick, f"{_listed(taken)} in the {side} one"
 
 
 def _listed(words: Words | None) -> str:

@@ -28,13 +28,13 @@ def shared_cores(jobs: int) -> list[str]:
     cores = len(os.sched_getaffinity(0))
     if jobs <= cores:
         return []
-    what = f"--jobs {jobs}: this process may use {cores} core{'s' if cores > 1 else ''}, so jobs share them"
-    return [f"{what}; --jobs {cores} makes as many executions"]
+    note = f"--jobs {jobs}: this process may use {cores} core{'s' if cores > 1 else ''}, so jobs share them"
+    return [f"{note}; --jobs {cores} makes as many executions"]
 
 
 def bound(proc: Path) -> Counter[int]:
     """How many processes are bound to each single core. Kernel threads, which have no memory, are left out."""
-    found: Counter[int] = Counter()
+    processes: Counter[int] = Counter()
     for status in proc.glob("[0-9]*/status"):
         try:
             lines = status.read_text(encoding="utf-8", errors="replace").splitlines()
@@ -43,8 +43,8 @@ def bound(proc: Path) -> Counter[int]:
         values = dict(line.split(":\t", 1) for line in lines if ":\t" in line)
         cores = values.get("Cpus_allowed_list", "")
         if "VmSize" in values and cores.isdecimal():
-            found[int(cores)] += 1
-    return found
+            processes[int(cores)] += 1
+    return processes
 
 
 class AflRun(Engine):
@@ -101,15 +101,15 @@ def why_ended(log: Path, target: Path) -> BadInput:
     if own:
         return BadInput(target, len(own), own[-1], "" if len(own) == 1 else f"whole text: {target}")
     text = _COLOUR.sub("", _read(log))
-    found = list(_ABORT.finditer(text))
-    if not found:
+    aborts = list(_ABORT.finditer(text))
+    if not aborts:
         last = next((line for line in reversed(text.splitlines()) if line.strip()), "it said nothing")
         return BadInput(log, "", f"afl-fuzz ended: {last.strip()}", _ELSE)
-    line = found[-1][1].strip()
-    reason = _REASON.search(text, found[-1].end())
-    said = f"{line} ({reason[1].strip()})" if reason else line
-    remedy = next((what for part, what in REMEDIES if part in said), _ELSE)
-    return BadInput(log, "", f"afl-fuzz ended: {said}", remedy)
+    line = aborts[-1][1].strip()
+    reason = _REASON.search(text, aborts[-1].end())
+    message = f"{line} ({reason[1].strip()})" if reason else line
+    remedy = next((what for part, what in REMEDIES if part in message), _ELSE)
+    return BadInput(log, "", f"afl-fuzz ended: {message}", remedy)
 
 
 def _read(path: Path) -> str:

@@ -125,8 +125,10 @@ def run_once(target: Target, data: bytes) -> int:
     if not target.run(data):
         print("nothing found")
         return NOTHING
-    found = target.failure
-    print(f"{found.check}: {found.what} (tick {found.tick}, PC {found.pc:#06x})" if found else "found")
+    failure = target.failure
+    print(
+        f"{failure.check}: {failure.what} (tick {failure.tick}, PC {failure.pc:#06x})" if failure else "found"
+    )
     print(target.describe(data))
     return FOUND
 

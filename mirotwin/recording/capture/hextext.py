@@ -19,9 +19,9 @@ _DIGIT = re.compile(rb"[0-9a-fA-F]")
 class HexError(BadInput):
     """Text that is no pair of digits: path, line and column (from 1), what, remedy."""
 
-    def __init__(self, path: str, line: int, column: int, what: str) -> None:
+    def __init__(self, path: str, line: int, column: int, reason: str) -> None:
         remedy = "write two hex digits a character, or force another --format"
-        super().__init__(path, (line, column), what, remedy)
+        super().__init__(path, (line, column), reason, remedy)
 
 
 class HexText:
@@ -70,8 +70,8 @@ class HexText:
             return
         shown = self._rest[:1].decode("ascii", "backslashreplace")
         alone = _DIGIT.match(self._rest) is not None
-        what = f"the digit {shown!r} stands alone" if alone else f"{shown!r} is no hex digit"
-        raise HexError(self.path, self.line, self.column, what)
+        reason = f"the digit {shown!r} stands alone" if alone else f"{shown!r} is no hex digit"
+        raise HexError(self.path, self.line, self.column, reason)
 
     @property
     def failed(self) -> bool:

@@ -23,9 +23,9 @@ def head_of(sent: Iterator[Transmission]) -> tuple[list[Transmission], Iterator[
     size = 0
     failure: Exception | None = None
     try:
-        while size < HEAD_CHARACTERS and (one := next(sent, None)) is not None:
-            head.append(one)
-            size += len(one.data)
+        while size < HEAD_CHARACTERS and (transmission := next(sent, None)) is not None:
+            head.append(transmission)
+            size += len(transmission.data)
     except READ_ERRORS as error:
         failure = error
 
@@ -43,9 +43,9 @@ def frame_counts(sent: Iterable[Transmission]) -> dict[int, int]:
     from miro_protocol.decoder import Decoder  # a hot module: not before the engine was chosen
 
     decoders = {count: Decoder(count) for count in ROBOT_COUNTS}
-    for one in sent:
+    for transmission in sent:
         for decoder in decoders.values():
-            decoder.hear(one)
+            decoder.hear(transmission)
     return {count: decoder.valid for count, decoder in decoders.items()}
 
 
@@ -56,13 +56,15 @@ def robots_in(head: Sequence[Transmission], network: int) -> tuple[int, str]:
     best = max(ROBOT_COUNTS, key=lambda count: (counts[count], -count))
     others = [count for count in ROBOT_COUNTS if count != best and counts[count]]
     if sent and not counts[best]:
-        what = f"no frame of 3 or 5 robots at the beginning; {best} robots assumed"
+        note = f"no frame of 3 or 5 robots at the beginning; {best} robots assumed"
     elif others:
-        found = " and ".join(f"{amount(counts[count], 'frame')} of {count} robots" for count in ROBOT_COUNTS)
-        what = f"{found} at the beginning; {best} robots assumed"
+        counted = " and ".join(
+            f"{amount(counts[count], 'frame')} of {count} robots" for count in ROBOT_COUNTS
+        )
+        note = f"{counted} at the beginning; {best} robots assumed"
     else:
         return best, ""
-    return best, f"network {network}: {what} (--robots says otherwise)"
+    return best, f"network {network}: {note} (--robots says otherwise)"
 
 
 def is_telemetry(head: Sequence[Transmission]) -> bool:
@@ -70,8 +72,8 @@ def is_telemetry(head: Sequence[Transmission]) -> bool:
     from miro_protocol.decoder import TelemetryDecoder
 
     decoder = TelemetryDecoder()
-    for one in head:
-        decoder.hear(one)
+    for transmission in head:
+        decoder.hear(transmission)
     return decoder.valid > max(frame_counts(head).values())
 
 
@@ -82,9 +84,9 @@ class Layouts:
     """
 
     def __init__(
-        self, said: int | None, source: Source, head: Sequence[Transmission], tell: Callable[[str], None]
+        self, requested: int | None, source: Source, head: Sequence[Transmission], tell: Callable[[str], None]
     ) -> None:
-        self.said = said
+        self.said = requested
         self.source = source
         self.head = head
         self.tell = tell
@@ -94,8 +96,8 @@ class Layouts:
         """InputError for more networks than decoders are kept for."""
         if network not in self.found:
             if len(self.found) == MOST_NETWORKS:
-                what = f"characters of more than {MOST_NETWORKS} networks"
-                raise InputError(self.source.label, what, "take one out with `mirotwin export --network`")
+                reason = f"characters of more than {MOST_NETWORKS} networks"
+                raise InputError(self.source.label, reason, "take one out with `mirotwin export --network`")
             count = self.said or self.source.robots.get(network)
             if count is None:
                 count, note = robots_in(self.head, network)
@@ -113,14 +115,14 @@ class Layouts:
 
 
 def look(
-    source: Source, said: int | None, tell: Callable[[str], None], guess_direction: bool = False
+    source: Source, requested: int | None, tell: Callable[[str], None], guess_direction: bool = False
 ) -> Layouts:
     """Looks at the beginning of `source` for what it does not say: layout, and the direction of raw bytes."""
     head: list[Transmission] = []
     guess_direction = guess_direction and not source.timed
-    if said is None or guess_direction:
+    if requested is None or guess_direction:
         head, source.sent = head_of(source.sent)
     if guess_direction and is_telemetry(head):
         head = [msgspec.structs.replace(one, direction=UP) for one in head]
         source.sent = (msgspec.structs.replace(one, direction=UP) for one in source.sent)
-    return Layouts(said, source, head, tell)
+    return Layouts(requested, source, head, tell)

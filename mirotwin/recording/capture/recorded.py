@@ -47,8 +47,8 @@ def transmissions(
 def transmissions_of(periods: Iterable[Period]) -> list[Transmission]:
     """The transmissions in `periods`, all from the first on, in the order of time."""
     order = _Order()
-    found = [sent for period in periods for sent in order.close(period.tick, period.wire)]
-    return [*found, *order.rest()]
+    closed = [sent for period in periods for sent in order.close(period.tick, period.wire)]
+    return [*closed, *order.rest()]
 
 
 def _ordered(messages: Messages, order: _Order, robots: dict[int, int]) -> Iterator[Transmission]:
@@ -128,7 +128,7 @@ class _Order:
         self._count += 1
 
     def _before(self, tick: int | None) -> list[Transmission]:
-        found = []
+        earlier = []
         while self._heap and (tick is None or self._heap[0][0] < tick):
-            found.append(heapq.heappop(self._heap)[-1])
-        return found
+            earlier.append(heapq.heappop(self._heap)[-1])
+        return earlier

@@ -172,8 +172,8 @@ PIECE_BYTES = 1 << 16
 class ConversionError(BadInput):
     """Transmissions that the other format cannot hold: tick, what, remedy."""
 
-    def __init__(self, tick: int, what: str, remedy: str) -> None:
-        super().__init__("", f"tick {tick}", what, remedy)
+    def __init__(self, tick: int, problem: str, remedy: str) -> None:
+        super().__init__("", f"tick {tick}", problem, remedy)
 
 
 def to_pcapng(sent: Iterable[Transmission]) -> Iterator[bytes]:
@@ -182,13 +182,14 @@ def to_pcapng(sent: Iterable[Transmission]) -> Iterator[bytes]:
 
 
 def _packets(sent: Iterable[Transmission]) -> Iterator[Transmission]:
-    for one in sent:
-        for place in range(0, len(one.data), pcapng.MAX_DATA):
-            tick = one.tick + place * character_ticks(one.direction)
-            if tick > pcapng.MAX_TICK or one.network > pcapng.MAX_NETWORK:
+    for transmission in sent:
+        for place in range(0, len(transmission.data), pcapng.MAX_DATA):
+            tick = transmission.tick + place * character_ticks(transmission.direction)
+            if tick > pcapng.MAX_TICK or transmission.network > pcapng.MAX_NETWORK:
                 limits = f"a capture holds ticks to {pcapng.MAX_TICK} and networks to {pcapng.MAX_NETWORK}"
-                raise ConversionError(tick, f"of network {one.network} does not fit", limits)
-            yield Transmission(tick, one.direction, one.data[place : place + pcapng.MAX_DATA], one.network)
+                raise ConversionError(tick, f"of network {transmission.network} does not fit", limits)
+            data = transmission.data[place : place + pcapng.MAX_DATA]
+            yield Transmission(tick, transmission.direction, data, transmission.network)
 
 
 def to_stream(sent: Iterable[Transmission], layout: Callable[[int], int]) -> Iterator[bytes]:
@@ -198,16 +199,18 @@ def to_stream(sent: Iterable[Transmission], layout: Callable[[int], int]) -> Ite
     temporary file.
     """
     version, last = 1, 0
-    with tempfile.TemporaryFile() as kept:
-        for one in sent:
-            if one.tick < last:
-                what = f"comes after tick {last}"
-                raise ConversionError(one.tick, what, "sort the capture first (`reordercap` does)")
-            last = one.tick
-            version = max(version, 1 + needs_version_2(one))
-            comment = "; ".join(described(row) for row in rows([one], layout))
-            kept.write(f"{stream.format_line(one, comment)}\n".encode())
+    with tempfile.TemporaryFile() as lines:
+        for transmission in sent:
+            if transmission.tick < last:
+                problem = f"comes after tick {last}"
+                raise ConversionError(
+                    transmission.tick, problem, "sort the capture first (`reordercap` does)"
+                )
+            last = transmission.tick
+            version = max(version, 1 + needs_version_2(transmission))
+            comment = "; ".join(described(row) for row in rows([transmission], layout))
+            lines.write(f"{stream.format_line(transmission, comment)}\n".encode())
         yield f"{FIRST_LINE.format(version)}\n".encode()
-        kept.seek(0)
-        while piece := kept.read(PIECE_BYTES):
+        lines.seek(0)
+        while piece := lines.read(PIECE_BYTES):
             yield piece

@@ -52,8 +52,8 @@ class _Decoding:
         """What these characters complete; None: what is pending cannot become a frame any more."""
         self.end_tick = self.end_tick if sent is None else sent.end_tick
         source = self.robot or self.decoder
-        for found in source.flush() if sent is None else source.hear(sent):
-            event, fresh = found if isinstance(found, tuple) else (found, None)
+        for reception in source.flush() if sent is None else source.hear(sent):
+            event, fresh = reception if isinstance(reception, tuple) else (reception, None)
             yield self.row(event, fresh)
             self.offset += len(event.data)
 
@@ -76,14 +76,16 @@ def rows(sent: Iterable[Transmission], layout: Callable[[int], int]) -> Iterator
     decodings: dict[tuple[int, str], _Decoding] = {}
     failure: Exception | None = None
     try:
-        for one in sent:
-            key = (one.network, one.direction)
+        for transmission in sent:
+            key = (transmission.network, transmission.direction)
             if key not in decodings:
-                decodings[key] = _Decoding(one.direction, one.network, layout(one.network))
+                decodings[key] = _Decoding(
+                    transmission.direction, transmission.network, layout(transmission.network)
+                )
             for other in decodings.values():
-                if other.decoder.pending and one.tick >= other.end_tick + 2 * other.step:
+                if other.decoder.pending and transmission.tick >= other.end_tick + 2 * other.step:
                     yield from other.hear(None)
-            yield from decodings[key].hear(one)
+            yield from decodings[key].hear(transmission)
     except READ_ERRORS as error:  # what is pending comes first
         failure = error
     for decoding in decodings.values():

@@ -78,24 +78,24 @@ def annotated_of(image: Image, images: Sequence[Image], sources: Sequence[str]) 
     return AnnotatedImage(*debugged_image(image, images, sources))
 
 
-def same_layout(one: Image, other: Image) -> bool:
+def same_layout(image: Image, other: Image) -> bool:
     """Whether all code, and what has a name, lies at the same addresses in both: then PC is compared with PC.
 
     Where one of them has no symbols, the extent of the code decides.
     """
-    if one.used != other.used:
+    if image.used != other.used:
         return False
-    names, others = one.symbols.names, other.symbols.names
+    names, others = image.symbols.names, other.symbols.names
     return not names or not others or names == others
 
 
-def changed_instructions(one: Image, other: Image) -> list[int]:
+def changed_instructions(image: Image, other: Image) -> list[int]:
     """Addresses at which an instruction may begin that differs between two images of the same layout."""
-    found = set()
-    for address, (here, there) in enumerate(zip(one.code, other.code, strict=False)):
+    addresses = set()
+    for address, (here, there) in enumerate(zip(image.code, other.code, strict=False)):
         if here != there:
             for before in range(min(3, address + 1)):
                 first = address - before
-                if max(LENGTH[one.code[first]], LENGTH[other.code[first]]) > before:
-                    found.add(first)
-    return sorted(found)
+                if max(LENGTH[image.code[first]], LENGTH[other.code[first]]) > before:
+                    addresses.add(first)
+    return sorted(addresses)

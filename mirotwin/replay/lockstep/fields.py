@@ -25,13 +25,13 @@ _RAM_BYTES = 0x100
 
 def variables(image: Image) -> list[tuple[int, str]]:
     """(first address, name) of everything in internal RAM that has a name, by address; the first name of a place."""
-    found: dict[int, str] = {}
+    names: dict[int, str] = {}
     if image.symbols.problem is not None:
         return []
     for name, symbol in sorted(image.symbols.names.items()):
         if symbol.space == "iram" and 0 <= symbol.address <= 0xFF:
-            found.setdefault(symbol.address, name)
-    return sorted(found.items())
+            names.setdefault(symbol.address, name)
+    return sorted(names.items())
 
 
 def name_of_byte(image: Image, address: int) -> str:
@@ -59,12 +59,12 @@ def extents(image: Image) -> dict[str, tuple[int, int]]:
         if places
         else {}
     )
-    found = {}
+    ranges = {}
     for (first, name), (end, _) in pairwise([*places, (_RAM_BYTES, "")]):
         if name != STACK:
             room = 1 if end == _RAM_BYTES else end - first  # where the last one ends is not known
-            found[name] = (first, min(sizes.get(name, room), end - first))
-    return found
+            ranges[name] = (first, min(sizes.get(name, room), end - first))
+    return ranges
 
 
 _RAM = ".cpu.iram"
@@ -80,17 +80,17 @@ class Record(msgspec.Struct, frozen=True):
     """Part of a result. As JSON: fields by name, `one` and `other` as a pair, a tick also in seconds of its `clock`."""
 
     def as_json(self) -> dict[str, Any]:
-        found: dict[str, Any] = {}
+        document: dict[str, Any] = {}
         fields = msgspec.structs.asdict(self)
         for name, value in fields.items():
             if name == "one":
                 pair = "places" if isinstance(value, Record) else "values"
-                found[pair] = [_as_json(value), _as_json(fields["other"])]
+                document[pair] = [_as_json(value), _as_json(fields["other"])]
             elif name not in ("other", "clock"):
-                found[name] = _as_json(value)
+                document[name] = _as_json(value)
             if name == "tick":
-                found["t_s"] = value / fields.get("clock", TICKS_PER_SECOND)
-        return found
+                document["t_s"] = value / fields.get("clock", TICKS_PER_SECOND)
+        return document
 
 
 def _as_json(value: Any) -> Any:
@@ -115,17 +115,17 @@ class FieldDifference(Record, frozen=True):
         return f"{self.path}{name}: {_shown(self.one)}, {_shown(self.other)}"
 
 
-def differing(one: World, other: World) -> Iterator[FieldDifference]:
+def differing(world: World, other: World) -> Iterator[FieldDifference]:
     """The fields that differ, item by item, of those that both worlds have and that enter a digest."""
-    first, second = one.state, other.state
+    first, second = world.state, other.state
     values, others = first.decode(first.save()), second.decode(second.save())
     for path, value in values.items():
-        if path == _CHAIN or path not in others or _is_apart(one, path):
+        if path == _CHAIN or path not in others or _is_apart(world, path):
             continue
         for item, here, there in item_differences(value, others[path]):
             if path.endswith(_RAM):
                 index = int(item[1:-1])
-                symbol = name_of_byte(one.image, index) or None
+                symbol = name_of_byte(world.image, index) or None
                 yield FieldDifference(f"{path}[{index:02X}h]", symbol, here, there)
             else:
                 yield FieldDifference(path + item, None, here, there)

@@ -51,14 +51,14 @@ class Moved(msgspec.Struct, frozen=True):
         return "; ".join(parts)
 
 
-def moved(one: AnnotatedImage, other: AnnotatedImage) -> Moved:
+def moved(image: AnnotatedImage, other: AnnotatedImage) -> Moved:
     """The map of the two, empty where one of them has no symbols."""
-    here, there = _pieces(one), _pieces(other)
+    here, there = _pieces(image), _pieces(other)
     same: list[str] = []
     changed: list[str] = []
     places: dict[int, int] = {}
     for name in filter(there.__contains__, here):
-        first, second = list(_instructions(one, *here[name])), list(_instructions(other, *there[name]))
+        first, second = list(_instructions(image, *here[name])), list(_instructions(other, *there[name]))
         differing = list(_differing(first, second))
         (changed if differing else same).append(name)
         places.update(differing)
@@ -85,23 +85,23 @@ def _instructions(annotated: AnnotatedImage, address: int, end: int) -> Iterator
     code, names = annotated.image.code, annotated.names
     while address < end:
         text = " ".join(disassemble(code, address, names).split())
-        text = _ADDRESS.sub(lambda found: names.place(int(found[1], 16)), text)
+        text = _ADDRESS.sub(lambda match: names.place(int(match[1], 16)), text)
         length = LENGTH[code[address]]
         yield address, bytes(code[address : address + length]), _OFFSET.sub("", text)
         address += length
 
 
-def _differing(one: list[Instruction], other: list[Instruction]) -> Iterator[tuple[int, int]]:
+def _differing(instructions: list[Instruction], other: list[Instruction]) -> Iterator[tuple[int, int]]:
     """Addresses in both at which the instructions begin to differ; at the end of a piece those of its last one."""
-    if [len(code) for _, code, _ in one] == [len(code) for _, code, _ in other]:
-        for (here, code, text), (there, code_there, text_there) in zip(one, other, strict=True):
+    if [len(code) for _, code, _ in instructions] == [len(code) for _, code, _ in other]:
+        for (here, code, text), (there, code_there, text_there) in zip(instructions, other, strict=True):
             if code != code_there and text != text_there:
                 yield here, there
         return
-    texts = [text for _, _, text in one], [text for _, _, text in other]
+    texts = [text for _, _, text in instructions], [text for _, _, text in other]
     for kind, first, _, second, _ in SequenceMatcher(None, *texts, autojunk=False).get_opcodes():
         if kind != "equal":
-            yield one[min(first, len(one) - 1)][0], other[min(second, len(other) - 1)][0]
+            yield instructions[min(first, len(instructions) - 1)][0], other[min(second, len(other) - 1)][0]
 
 
 def _listed(names: tuple[str, ...]) -> str:
@@ -128,18 +128,18 @@ class FirmwareDifference(Record, frozen=True):
 
 
 def first_instruction(
-    make: Make, one: AnnotatedImage, other: AnnotatedImage, until_tick: int
+    make: Make, image: AnnotatedImage, other: AnnotatedImage, until_tick: int
 ) -> FirmwareDifference:
     """Runs both firmwares from tick 0 to at most `until_tick` and finds where they go apart."""
-    annotated = one, other
+    annotated = image, other
     notes = list(_missing(annotated))
 
     def worlds() -> tuple[World, World]:
-        made = make(one.image), make(other.image)
-        one.clock = other.clock = made[0].clock
+        made = make(image.image), make(other.image)
+        image.clock = other.clock = made[0].clock
         return made
 
-    if same_layout(one.image, other.image):
+    if same_layout(image.image, other.image):
         changed = Stepper(*worlds(), annotated).changed(until_tick)
         effect = Stepper(*worlds(), annotated).effect(until_tick)
         if changed is None and effect is not None:
@@ -147,7 +147,7 @@ def first_instruction(
         if effect is None:
             notes.insert(0, "the states are the same each millisecond: no instruction has a lasting effect")
         return FirmwareDifference(changed, effect, notes=tuple(notes))
-    mapping = moved(one, other)
+    mapping = moved(image, other)
     mapped = _first_mapped(worlds(), annotated, mapping, until_tick)
     builds = Builds(*worlds(), annotated)
     variables = builds.variables(until_tick)
@@ -166,8 +166,8 @@ def _first_mapped(
     until_tick: int,
 ) -> InstructionDifference | None:
     """The first changed instruction that the first firmware executes, and the one in its place in the second."""
-    one, other = worlds
-    event = first_reached(one, mapping.places, until_tick)
+    world, other = worlds
+    event = first_reached(world, mapping.places, until_tick)
     if event is None:
         return None
     there = mapping.places[event.address]
@@ -190,14 +190,14 @@ def _compared(builds: Builds) -> str:
 
 def _missing(annotated: tuple[AnnotatedImage, AnnotatedImage]) -> Iterator[str]:
     """Debug files that are missing or wrong, a line each."""
-    for one in annotated:
-        image = one.image
+    for firmware in annotated:
+        image = firmware.image
         beside = "put its .map, .cdb and .rst beside it"
         if not image.path.is_file():
             beside = "a recording holds no debug files; --lines-from names the file that they lie beside"
-        if one.problem is not None:
-            yield f"C lines are missing: {one.problem}"
+        if firmware.problem is not None:
+            yield f"C lines are missing: {firmware.problem}"
         elif not image.symbols.names:
             yield f"no symbols of {image.path}: {beside}"
-        elif not one.debug.lines:
+        elif not firmware.debug.lines:
             yield f"no C lines of {image.path}: {beside}"

@@ -97,12 +97,12 @@ class LiveState:
 class Processors(WorldPair):
     """Two worlds whose processors alone are compared."""
 
-    def __init__(self, one: World, other: World) -> None:
-        super().__init__(one, other)
+    def __init__(self, world: World, other: World) -> None:
+        super().__init__(world, other)
         # One layout: where one image has no symbols, its stack begins where that of the other does.
-        stacks = (image.symbols.names.get(STACK) for image in (one.image, other.image))
+        stacks = (image.symbols.names.get(STACK) for image in (world.image, other.image))
         self.stack = next((symbol.address for symbol in stacks if symbol is not None), None)
-        both = zip(one.devices, other.devices, strict=True)
+        both = zip(world.devices, other.devices, strict=True)
         self.live = [
             (LiveState(a.board.cpu, self.stack), LiveState(b.board.cpu, self.stack)) for a, b in both
         ]
@@ -134,18 +134,18 @@ class InstructionLog(Watcher):
 class Stepper:
     """Two worlds at one tick with firmwares of the same layout."""
 
-    def __init__(self, one: World, other: World, annotated: tuple[AnnotatedImage, AnnotatedImage]) -> None:
-        self.pair = Processors(one, other)
+    def __init__(self, world: World, other: World, annotated: tuple[AnnotatedImage, AnnotatedImage]) -> None:
+        self.pair = Processors(world, other)
         self.annotated = annotated
 
     def changed(self, until_tick: int) -> InstructionDifference | None:
         """The first changed instruction that is executed, and what it does in both."""
-        one, other = self.pair.one, self.pair.other
-        event = first_reached(one, changed_instructions(one.image, other.image), until_tick)
+        world, other = self.pair.one, self.pair.other
+        event = first_reached(world, changed_instructions(world.image, other.image), until_tick)
         if event is None:
             return None
-        other.run_to(one.tick)
-        device = one.device(event.network, event.slot)
+        other.run_to(world.tick)
+        device = world.device(event.network, event.slot)
         tick = device.board.cpu.cycles * CYCLE_TICKS
         for here, there in self._pieces(tick + 1, tick + 1):
             if here.device is device and here.steps and there.steps:
@@ -159,18 +159,18 @@ class Stepper:
             found_tick = self.pair.narrow(LOOK_TICKS, until_tick)
             if found_tick is None:
                 return None
-            found = [
+            differences = [
                 self._difference(here, there, *lasting)
                 for here, there in self._pieces(found_tick + LASTING_TICKS, found_tick + STEPPED_TICKS)
                 if (lasting := _lasting(here.steps, there.steps)) is not None
             ]
-            if found:
-                return min(found, key=lambda one: one.one.tick)
+            if differences:
+                return min(differences, key=lambda one: one.one.tick)
 
     def _pieces(self, tick: int, end_tick: int) -> Iterator[tuple[InstructionLog, InstructionLog]]:
         """Runs both to `tick` and in pieces on to `end_tick`; all devices of the first piece that is not the same."""
-        one, other, stack = self.pair.one, self.pair.other, self.pair.stack
-        both = zip(one.devices, other.devices, strict=True)
+        world, other, stack = self.pair.one, self.pair.other, self.pair.stack
+        both = zip(world.devices, other.devices, strict=True)
         pairs = [(InstructionLog(a, stack), InstructionLog(b, stack)) for a, b in both]
         try:
             while True:

@@ -45,12 +45,14 @@ class StateDifference(Record, frozen=True):
 class WorldPair:
     """Two worlds at one tick. Raises ValueError for worlds that are not."""
 
-    def __init__(self, one: World, other: World) -> None:
-        if one.tick != other.tick:
-            raise ValueError(f"the worlds stand at ticks {one.tick} and {other.tick}: move them to one tick")
-        self.one = one
+    def __init__(self, world: World, other: World) -> None:
+        if world.tick != other.tick:
+            raise ValueError(
+                f"the worlds stand at ticks {world.tick} and {other.tick}: move them to one tick"
+            )
+        self.one = world
         self.other = other
-        self.alike = one.state.tables() == other.state.tables()
+        self.alike = world.state.tables() == other.state.tables()
 
     @property
     def tick(self) -> int:
@@ -98,7 +100,7 @@ class WorldPair:
 
 
 def first_difference(
-    one: World, other: World, until_tick: int | None = None, look_ticks: int = LOOK_TICKS
+    world: World, other: World, until_tick: int | None = None, look_ticks: int = LOOK_TICKS
 ) -> StateDifference | None:
     """The first tick at which the states of two worlds differ, from where both stand up to `until_tick`.
 
@@ -109,9 +111,9 @@ def first_difference(
     """
     if look_ticks < 1:
         raise ValueError(f"look_ticks is {look_ticks}: give 1 or more")
-    pair = WorldPair(one, other)
+    pair = WorldPair(world, other)
     if not pair.differ():
-        end_tick = one.period_ticks * min(one.periods, other.periods)
+        end_tick = world.period_ticks * min(world.periods, other.periods)
         found_tick = end_tick if until_tick is None else until_tick
         for step_ticks in (look_ticks, *(step for step in STEPS_TICKS if step < look_ticks)):
             narrowed_tick = pair.narrow(step_ticks, found_tick)
@@ -122,4 +124,4 @@ def first_difference(
     fields = pair.fields()
     if not fields:
         return None
-    return StateDifference(pair.tick, max(0, pair.tick - 1) // one.period_ticks, fields, one.clock)
+    return StateDifference(pair.tick, max(0, pair.tick - 1) // world.period_ticks, fields, world.clock)

@@ -51,8 +51,8 @@ class VariableDifference(Record, frozen=True):
 class Builds:
     """Two worlds at one tick with firmwares of other layouts. `looks`: how often both processors slept."""
 
-    def __init__(self, one: World, other: World, annotated: tuple[AnnotatedImage, AnnotatedImage]) -> None:
-        self.pair = WorldPair(one, other)
+    def __init__(self, world: World, other: World, annotated: tuple[AnnotatedImage, AnnotatedImage]) -> None:
+        self.pair = WorldPair(world, other)
         self.annotated = annotated
         first, second = (extents(image.image) for image in annotated)
         self.places = {
@@ -76,8 +76,11 @@ class Builds:
             if self._look(before):
                 before = self.pair.mark()
                 self.last_tick = self.pair.tick
-        found = sorted((self.since or self.gone).values(), key=lambda one: one[0].tick)
-        return [self._traced(one, mark) if index < TRACED else one for index, (one, mark) in enumerate(found)]
+        differences = sorted((self.since or self.gone).values(), key=lambda one: one[0].tick)
+        return [
+            self._traced(one, mark) if index < TRACED else one
+            for index, (one, mark) in enumerate(differences)
+        ]
 
     def _look(self, before: tuple[Mark, Mark]) -> bool:
         """Compares the variables of each device whose processors sleep; whether all do."""
@@ -96,29 +99,29 @@ class Builds:
                     if was is not None and was[0].tick < self.last_tick:
                         self.gone.setdefault(key, was)
                 elif key not in self.since:
-                    found = VariableDifference(
+                    difference = VariableDifference(
                         self.pair.tick, *key, _value(here), _value(there), clock=self.pair.one.clock
                     )
-                    self.since[key] = found, before
+                    self.since[key] = difference, before
         return slept
 
-    def _traced(self, found: VariableDifference, before: tuple[Mark, Mark]) -> VariableDifference:
-        """`found` with the instructions that wrote the variable, searched from the look before it differed."""
+    def _traced(self, difference: VariableDifference, before: tuple[Mark, Mark]) -> VariableDifference:
+        """`difference` with the instructions that wrote the variable, searched from the look before it differed."""
         self.pair.go_back(before)
-        first, second, size = self.places[found.name]
+        first, second, size = self.places[difference.name]
         watchers = Writes(first, size), Writes(second, size)
         for world, watcher in zip((self.pair.one, self.pair.other), watchers, strict=True):
-            attach(world.device(found.network, found.slot).board.cpu, watcher)
+            attach(world.device(difference.network, difference.slot).board.cpu, watcher)
         try:
-            self.pair.run_to(found.tick)
+            self.pair.run_to(difference.tick)
         finally:
             for world, watcher in zip((self.pair.one, self.pair.other), watchers, strict=True):
-                detach(world.device(found.network, found.slot).board.cpu, watcher)
+                detach(world.device(difference.network, difference.slot).board.cpu, watcher)
         writers = [
             None if watcher.last is None else image.place(*watcher.last)
             for image, watcher in zip(self.annotated, watchers, strict=True)
         ]
-        return msgspec.structs.replace(found, writers=tuple(writers))
+        return msgspec.structs.replace(difference, writers=tuple(writers))
 
 
 class Writes(Watcher):

@@ -97,9 +97,9 @@ class Conversion:
 
     def _take_channel(self, record: Channel) -> None:
         if record.topic.startswith(derived.PREFIX):
-            what = f"holds Foxglove's topics already ({record.topic})"
+            reason = f"holds Foxglove's topics already ({record.topic})"
             raise BadInput(
-                self.path, "", what, "open it in Foxglove, or give the run.mcap that it was made of"
+                self.path, "", reason, "open it in Foxglove, or give the run.mcap that it was made of"
             )
         topic = topic_of(record.topic)
         schema = self._schemas.get(record.schema_id, 0)
@@ -118,8 +118,8 @@ class Conversion:
             self._take_image(topic, record)
         elif topic.channel == FAULT and topic.slot >= 0:
             fault = self._faults.decode(record.data)
-            at, robot = messages.time_of(fault.tick), robot_frame(topic.network, topic.slot)
-            line = messages.Log(at, messages.ERROR, f"firmware fault: {fault.text}", robot)
+            time, robot = messages.time_of(fault.tick), robot_frame(topic.network, topic.slot)
+            line = messages.Log(time, messages.ERROR, f"firmware fault: {fault.text}", robot)
             self._add(DerivedMessage(derived.LOG, fault.tick, line))
         elif topic.channel == PERIOD and (period := next(self._coming, None)):
             for message in self.derive.period(period):

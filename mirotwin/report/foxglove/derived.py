@@ -64,16 +64,16 @@ class Derived:
 
     def period(self, period: Period) -> Iterator[DerivedMessage]:
         """Everything about a control period."""
-        tick, at = period.tick, time_of(period.tick)
+        tick, time = period.tick, time_of(period.tick)
         still = self._count % AGAIN == 0
         self._count += 1
-        yield DerivedMessage(TRANSFORMS, tick, self._transforms(period, at))
+        yield DerivedMessage(TRANSFORMS, tick, self._transforms(period, time))
         if still:
-            yield from self._standing(period, at)
+            yield from self._standing(period, time)
         trails: list[SceneEntity] = []
         for robot in period.robots:
             trail = self._trails.setdefault((robot.network, robot.slot), robots.Trail())
-            trails += trail.add(robot, period.index, at)
+            trails += trail.add(robot, period.index, time)
         yield DerivedMessage(TRAILS, tick, SceneUpdate(tuple(trails)))
         for robot in period.robots:
             place = robot.network, robot.slot
@@ -87,29 +87,29 @@ class Derived:
         for action in period.actions:
             yield DerivedMessage(LOG, action.tick, notes.of_action(action))
 
-    def _transforms(self, period: Period, at: Timestamp) -> FrameTransforms:
-        transforms = [frame for robot in period.robots for frame in frames.of_robot(robot, at)]
+    def _transforms(self, period: Period, time: Timestamp) -> FrameTransforms:
+        transforms = [frame for robot in period.robots for frame in frames.of_robot(robot, time)]
         if self._lens is not None:
-            transforms += [frames.transform(network, self._lens.lens, at) for network in _networks(period)]
+            transforms += [frames.transform(network, self._lens.lens, time) for network in _networks(period)]
         return FrameTransforms(tuple(transforms))
 
-    def _standing(self, period: Period, at: Timestamp) -> Iterator[DerivedMessage]:
-        yield DerivedMessage(SCENE, period.tick, SceneUpdate(tuple(self._scene(period, at))))
+    def _standing(self, period: Period, time: Timestamp) -> Iterator[DerivedMessage]:
+        yield DerivedMessage(SCENE, period.tick, SceneUpdate(tuple(self._scene(period, time))))
         if self._lens is not None:
             for network in _networks(period):
-                message = frames.calibration(network, self._lens.lens, at)
+                message = frames.calibration(network, self._lens.lens, time)
                 yield DerivedMessage(f"{PREFIX}net{network}/calibration", period.tick, message)
 
-    def _scene(self, period: Period, at: Timestamp) -> Iterator[SceneEntity]:
-        yield pitch.pitch(at)
+    def _scene(self, period: Period, time: Timestamp) -> Iterator[SceneEntity]:
+        yield pitch.pitch(time)
         if isinstance(self._lens, PixelCamera) and self._lens.ball is not None:
-            yield pitch.ball(self._lens.ball, at)
+            yield pitch.ball(self._lens.ball, time)
         pattern = None if self._lens is None else self._lens.pattern
         for robot in period.robots:
             place = robot.network, robot.slot
-            yield from robots.drawn(*place, pattern, at)
+            yield from robots.drawn(*place, pattern, time)
             if self._paths.get(place):
-                yield robots.reference_line(*place, self._paths[place], at)
+                yield robots.reference_line(*place, self._paths[place], time)
 
 
 def _networks(period: Period) -> list[int]:

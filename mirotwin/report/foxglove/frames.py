@@ -34,7 +34,7 @@ def camera_frame(network: int) -> str:
     return f"net{network}/camera"
 
 
-def of_robot(robot: RobotPeriod, at: Timestamp) -> Iterator[FrameTransform]:
+def of_robot(robot: RobotPeriod, time: Timestamp) -> Iterator[FrameTransform]:
     """Truth, reference, and the measurement if there is one."""
     frame = robot_frame(robot.network, robot.slot)
     for name, posture in (
@@ -44,28 +44,28 @@ def of_robot(robot: RobotPeriod, at: Timestamp) -> Iterator[FrameTransform]:
     ):
         if posture is not None:
             place = Vector3(posture.x_m, posture.y_m, 0.0)
-            yield FrameTransform(at, PITCH, name, place, heading(posture.theta_rad))
+            yield FrameTransform(time, PITCH, name, place, heading(posture.theta_rad))
 
 
 UPSIDE_DOWN = Quaternion(1.0, 0.0, 0.0, 0.0)
 """From right, up, backwards to right, down, ahead: half a turn about the first."""
 
 
-def transform(network: int, lens: CameraParameters, at: Timestamp) -> FrameTransform:
+def transform(network: int, lens: CameraParameters, time: Timestamp) -> FrameTransform:
     """Where the camera hangs and where it looks: turned, tilted, and upside down."""
     turned = _about(lens.turn_rad, (0.0, 0.0, 1.0))
     tilted = _product(_about(lens.tilt_x_rad, (1.0, 0.0, 0.0)), _about(lens.tilt_y_rad, (0.0, 1.0, 0.0)))
     place = Vector3(lens.x_m, lens.y_m, lens.height_m)
     rotation = _product(_product(tilted, turned), UPSIDE_DOWN)
-    return FrameTransform(at, PITCH, camera_frame(network), place, rotation)
+    return FrameTransform(time, PITCH, camera_frame(network), place, rotation)
 
 
-def calibration(network: int, lens: CameraParameters, at: Timestamp) -> CameraCalibration:
+def calibration(network: int, lens: CameraParameters, time: Timestamp) -> CameraCalibration:
     """The true optics."""
     along, down = lens.focal_px, lens.focal_px * lens.pixel_aspect
     u, v = lens.centre_u_px - 0.5, lens.centre_v_px - 0.5
     return CameraCalibration(
-        timestamp=at,
+        timestamp=time,
         frame_id=camera_frame(network),
         width=WIDTH,
         height=HEIGHT,

@@ -26,14 +26,14 @@ class RobotNotes:
 
     def add(self, robot: RobotPeriod, tick: int) -> Iterator[Log]:
         """Lines about the control period that began at `tick`."""
-        at, name = time_of(tick), robot_frame(robot.network, robot.slot)
+        time, name = time_of(tick), robot_frame(robot.network, robot.slot)
         measured = robot.measurement is not None
         if self._measured is not None and measured != self._measured:
             words = "measured again" if measured else "not measured: the robot or the frame was lost"
-            yield Log(at, INFO if measured else WARNING, words, name)
+            yield Log(time, INFO if measured else WARNING, words, name)
         if measured or self._measured is not None:  # nothing is measured before the first frame has arrived
             self._measured = measured
-        yield from (Log(at, WARNING, words, name) for words in self._frames(robot))
+        yield from (Log(time, WARNING, words, name) for words in self._frames(robot))
         self._commanded = self._commanded + 1 if robot.control is not None else 0
         self._before = robot
 
@@ -61,9 +61,9 @@ def _more(before: int | None, now: int | None) -> int:
 
 def of_action(action: Action) -> Log:
     """What was done to a robot, or to the radio of a network."""
-    at = time_of(action.tick)
+    time = time_of(action.tick)
     if isinstance(action, RadioState):
-        return Log(at, INFO, f"radio: {action.state}", f"net{action.network}")
+        return Log(time, INFO, f"radio: {action.state}", f"net{action.network}")
     if isinstance(action, Reset):
-        return Log(at, INFO, f"reset: {action.level}", robot_frame(action.network, action.slot))
-    return Log(at, INFO, f"power: {action.on}", robot_frame(action.network, action.slot))
+        return Log(time, INFO, f"reset: {action.level}", robot_frame(action.network, action.slot))
+    return Log(time, INFO, f"power: {action.on}", robot_frame(action.network, action.slot))

@@ -48,10 +48,10 @@ CIRCLE_POINTS = 48
 _TURN_RAD = 6.283185307179586
 
 
-def pitch(at: Timestamp) -> SceneEntity:
+def pitch(time: Timestamp) -> SceneEntity:
     """Everything but the ball."""
     return SceneEntity(
-        timestamp=at,
+        timestamp=time,
         frame_id=PITCH,
         id="pitch",
         cubes=(*_floor(), *_walls()),
@@ -60,12 +60,12 @@ def pitch(at: Timestamp) -> SceneEntity:
     )
 
 
-def ball(found: Ball, at: Timestamp) -> SceneEntity:
+def ball(placed: Ball, time: Timestamp) -> SceneEntity:
     """The golf ball, which lies still."""
-    across, place = 2.0 * BALL_RADIUS_M, Vector3(found.x_cm / 100.0, found.y_cm / 100.0, BALL_RADIUS_M)
+    across, place = 2.0 * BALL_RADIUS_M, Vector3(placed.x_cm / 100.0, placed.y_cm / 100.0, BALL_RADIUS_M)
     size = Vector3(across, across, across)
     sphere = SolidPrimitive(Pose(place, shapes.STRAIGHT), size, shapes.paint("ball middle"))
-    return SceneEntity(timestamp=at, frame_id=PITCH, id="ball", spheres=(sphere,))
+    return SceneEntity(timestamp=time, frame_id=PITCH, id="ball", spheres=(sphere,))
 
 
 def _floor() -> Iterator[SolidPrimitive]:

@@ -46,16 +46,16 @@ REFERENCE = Color(0.2, 0.9, 0.3, 1.0)
 LABEL = Color(1.0, 1.0, 1.0, 1.0)
 
 
-def drawn(network: int, slot: int, pattern: PatternName | None, at: Timestamp) -> Iterator[SceneEntity]:
+def drawn(network: int, slot: int, pattern: PatternName | None, time: Timestamp) -> Iterator[SceneEntity]:
     """A robot, its measurement and its reference; without a `pattern` its top is plain."""
     frame = robot_frame(network, slot)
     label = TextPrimitive(
         Pose(Vector3(0.0, 0.0, LABEL_Z_M), shapes.STRAIGHT), True, 0.02, False, LABEL, frame
     )
     cubes = (*_body(), *(() if pattern is None else _patches(network, slot, pattern)))
-    yield SceneEntity(timestamp=at, frame_id=frame, id=frame, cubes=cubes, texts=(label,))
-    yield _outline(f"{frame}/measured", MEASURED, at)
-    yield _outline(f"{frame}/reference", REFERENCE, at)
+    yield SceneEntity(timestamp=time, frame_id=frame, id=frame, cubes=cubes, texts=(label,))
+    yield _outline(f"{frame}/measured", MEASURED, time)
+    yield _outline(f"{frame}/reference", REFERENCE, time)
 
 
 def _body() -> Iterator[SolidPrimitive]:
@@ -74,7 +74,7 @@ def _patches(network: int, slot: int, pattern: PatternName) -> Iterator[SolidPri
             yield shapes.box(low, high, shapes.paint(names[number]))
 
 
-def _outline(frame: str, color: Color, at: Timestamp) -> SceneEntity:
+def _outline(frame: str, color: Color, time: Timestamp) -> SceneEntity:
     """The square seen from above, and a line from its centre ahead; a little above the robot's top."""
     z_m = ROBOT_HEIGHT_M + 2.0 * TOP_M
     corners = ((HALF_M, HALF_M), (-HALF_M, HALF_M), (-HALF_M, -HALF_M), (HALF_M, -HALF_M))
@@ -82,7 +82,7 @@ def _outline(frame: str, color: Color, at: Timestamp) -> SceneEntity:
         shapes.line(corners, z_m, OUTLINE_M, color, LINE_LOOP),
         shapes.line(((0.0, 0.0), (HALF_M, 0.0)), z_m, OUTLINE_M, color),
     )
-    return SceneEntity(timestamp=at, frame_id=frame, id=frame, lines=lines)
+    return SceneEntity(timestamp=time, frame_id=frame, id=frame, lines=lines)
 
 
 KEPT = 30
@@ -103,35 +103,35 @@ class Trail:
         self._truth: deque[Point] = deque(maxlen=KEPT)
         self._seen: deque[Point] = deque(maxlen=KEPT)
 
-    def add(self, robot: RobotPeriod, index: int, at: Timestamp) -> Iterator[SceneEntity]:
+    def add(self, robot: RobotPeriod, index: int, time: Timestamp) -> Iterator[SceneEntity]:
         """The trails up to control period `index`, which is added."""
         frame = robot_frame(robot.network, robot.slot)
-        for name, kept, posture, color in (
+        for name, past, posture, color in (
             ("truth", self._truth, robot.truth, shapes.paint("side")),
             ("measured", self._seen, robot.measurement, MEASURED),
         ):
-            points = [*kept, *(() if posture is None else ((posture.x_m, posture.y_m),))]
+            points = [*past, *(() if posture is None else ((posture.x_m, posture.y_m),))]
             if posture is not None and index % EVERY == 0:
-                kept.append(points[-1])
+                past.append(points[-1])
             line = shapes.line(points, TRAIL_Z_M, WIDE_M, color)
-            yield SceneEntity(timestamp=at, frame_id=PITCH, id=f"{frame}/trail/{name}", lines=(line,))
+            yield SceneEntity(timestamp=time, frame_id=PITCH, id=f"{frame}/trail/{name}", lines=(line,))
 
 
 def reference_points(robot: RobotSpec, duration_s: float) -> tuple[Point, ...]:
     """The whole path that a robot is to go; none for one of another distribution that fails."""
     try:
         trajectory = reference_for(robot, duration_s)
-        found = [trajectory.at(at_s).posture for at_s in _instants(trajectory, duration_s)]
+        postures = [trajectory.at(at_s).posture for at_s in _instants(trajectory, duration_s)]
     except PluginError:
         return ()
-    return tuple((at.x_m, at.y_m) for at in found)
+    return tuple((at.x_m, at.y_m) for at in postures)
 
 
-def reference_line(network: int, slot: int, points: Iterable[Point], at: Timestamp) -> SceneEntity:
+def reference_line(network: int, slot: int, points: Iterable[Point], time: Timestamp) -> SceneEntity:
     """It as a line on the floor."""
     line = shapes.line(points, PATH_Z_M, WIDE_M, REFERENCE)
     name = f"{robot_frame(network, slot)}/path"
-    return SceneEntity(timestamp=at, frame_id=PITCH, id=name, lines=(line,))
+    return SceneEntity(timestamp=time, frame_id=PITCH, id=name, lines=(line,))
 
 
 def _instants(trajectory: Trajectory, duration_s: float) -> Iterator[float]:

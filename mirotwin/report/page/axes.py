@@ -74,11 +74,11 @@ def time_range(times_s: list[float], period_s: float) -> Range1d:
 
 def at_least(span: float, *columns: Any) -> tuple[float, float] | None:
     """Ends of an axis that is `span` wide, where the numbers vary by less: an axis never shows rounding noise."""
-    found = np.concatenate([np.asarray(one, dtype=np.float64) for one in columns])
-    found = found[np.isfinite(found)]
-    if not found.size or found.max() - found.min() >= span:
+    values = np.concatenate([np.asarray(one, dtype=np.float64) for one in columns])
+    values = values[np.isfinite(values)]
+    if not values.size or values.max() - values.min() >= span:
         return None
-    middle = (found.max() + found.min()) / 2.0
+    middle = (values.max() + values.min()) / 2.0
     return float(middle - span / 2.0), float(middle + span / 2.0)
 
 

@@ -57,10 +57,10 @@ def document_json(figures: Mapping[str, Any]) -> bytes:
 
 def _numbered_anew(text: bytes) -> bytes:
     numbers: dict[bytes, int] = {}
-    for found in _MODEL_ID.finditer(text):
-        numbers.setdefault(found[1], len(numbers) + 1)
+    for match in _MODEL_ID.finditer(text):
+        numbers.setdefault(match[1], len(numbers) + 1)
     return re.sub(
-        rb'"p([0-9]+)"', lambda found: b'"m%d"' % numbers[found[1]] if found[1] in numbers else found[0], text
+        rb'"p([0-9]+)"', lambda match: b'"m%d"' % numbers[match[1]] if match[1] in numbers else match[0], text
     )
 
 

@@ -62,8 +62,8 @@ def is_page(path: Path) -> bool:
 def check_size(page: bytes, name: str, remedy: str) -> None:
     """Raises BadInput for a page that is too large."""
     if len(page) > MOST_BYTES:
-        what = f"the page has {len(page) / 1e6:.0f} MB, {MOST_BYTES / 1e6:.0f} are allowed"
-        raise BadInput(name, "", what, remedy)
+        reason = f"the page has {len(page) / 1e6:.0f} MB, {MOST_BYTES / 1e6:.0f} are allowed"
+        raise BadInput(name, "", reason, remedy)
 
 
 def place_of_page(out: Path | None, force: bool, *inputs: str | None) -> Path:

@@ -50,15 +50,15 @@ def coverage_rows(image: Image, counts: Counts, sources: Sources) -> CoverageRow
     if not debug.lines:
         text, record = by_listing(image, counts)
         files = [_file("listing", text.splitlines(), record)]
-        found: Tracefile = {"listing": record}
+        executed: Tracefile = {"listing": record}
     else:
-        found = by_line(image, debug, counts)
+        executed = by_line(image, debug, counts)
         files = []
-        for name in sorted(found, key=lambda name: PurePath(name).name):
+        for name in sorted(executed, key=lambda name: PurePath(name).name):
             path = sources.path(name)
             lines = [] if path is None else read_text(path).splitlines()
-            files.append(_file(PurePath(name).name, lines, found[name]))
-    return CoverageRows(files, line_share(found), branch_share(found), instructions, not debug.lines)
+            files.append(_file(PurePath(name).name, lines, executed[name]))
+    return CoverageRows(files, line_share(executed), branch_share(executed), instructions, not debug.lines)
 
 
 def _file(name: str, lines: list[str], record: FileRecord) -> SourceFile:
@@ -67,5 +67,5 @@ def _file(name: str, lines: list[str], record: FileRecord) -> SourceFile:
         rows = [(number, record.lines.get(number), text) for number, text in enumerate(lines, 1)]
     else:
         rows = [(number, count, "") for number, count in sorted(record.lines.items())]
-    one = {name: record}
-    return SourceFile(name, line_share(one), branch_share(one), rows)
+    tracefile = {name: record}
+    return SourceFile(name, line_share(tracefile), branch_share(tracefile), rows)

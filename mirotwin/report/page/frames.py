@@ -41,7 +41,7 @@ class Extras(msgspec.Struct, frozen=True):
 def extras_of(path: str | Path, from_tick: int, to_tick: int, frames: bool) -> Extras:
     """Frames, if they are wanted, and samples from `from_tick` to before `to_tick`. Raises RecordingError."""
     kinds: list[type[msgspec.Struct]] = [SampleMessage, *([ImageMessage] if frames else [])]
-    found: list[CameraFrame] = []
+    pictures: list[CameraFrame] = []
     samples: list[tuple[RobotId, SampleMessage]] = []
     with open(path, "rb") as stream:
         messages = Messages(stream.read, str(path), kinds)
@@ -51,12 +51,12 @@ def extras_of(path: str | Path, from_tick: int, to_tick: int, frames: bool) -> E
                 if not from_tick <= message.tick < to_tick:
                     continue
                 if isinstance(message, ImageMessage):
-                    found.append(_frame(str(path), place.network, message))
+                    pictures.append(_frame(str(path), place.network, message))
                 else:
                     samples.append(((place.network, place.slot), message))
         except Cut:  # what came before is whole
             cut = True
-    return Extras(found, samples, cut or bool(messages.broken_off))
+    return Extras(pictures, samples, cut or bool(messages.broken_off))
 
 
 def _frame(path: str, network: int, message: ImageMessage) -> CameraFrame:
@@ -68,6 +68,6 @@ def _frame(path: str, network: int, message: ImageMessage) -> CameraFrame:
         with Picture.open(BytesIO(message.data)) as picture:
             picture.convert("RGB").save(small, "JPEG", quality=QUALITY, optimize=True)
     except (UnidentifiedImageError, OSError, ValueError, Picture.DecompressionBombError):
-        what = f"the camera frame at tick {message.tick} is no picture"
-        raise BadInput(path, "camera/image", what, "leave the frames out with --no-frames") from None
+        reason = f"the camera frame at tick {message.tick} is no picture"
+        raise BadInput(path, "camera/image", reason, "leave the frames out with --no-frames") from None
     return CameraFrame(network, message.tick, base64.b64encode(small.getvalue()).decode())

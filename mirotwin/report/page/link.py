@@ -78,11 +78,11 @@ class Arrivals:
         """Nothing more comes."""
         self._note(self._receiver.flush())
 
-    def _note(self, found: Sequence[Reception]) -> None:
+    def _note(self, receptions: Sequence[Reception]) -> None:
         """Every character belongs to one event, in the order in which they came."""
-        for one, fresh in found:
-            self.all.append(Arrival(tuple(self._ticks[: len(one.data)]), fresh))
-            del self._ticks[: len(one.data)]
+        for reception, fresh in receptions:
+            self.all.append(Arrival(tuple(self._ticks[: len(reception.data)]), fresh))
+            del self._ticks[: len(reception.data)]
 
 
 class LinkLog:
@@ -113,22 +113,22 @@ class LinkLog:
 
     def marks(self) -> list[LinkMark]:
         """All marks, lane by lane, in the order of time."""
-        found: list[LinkMark] = []
+        marks: list[LinkMark] = []
         for network in self.world.networks:
             index = network.index
             sent = [one for one in self.wire if one.network == index and one.direction == DOWN]
-            heard = [one for one in self.wire if one.network == index and one.direction != DOWN]
+            received = [one for one in self.wire if one.network == index and one.direction != DOWN]
             named = [_named(one, network.spec.robots) for one in sent]
             delay = ticks(network.spec.radio.latency_s)
-            found += [_sent(one, name) for one, name in zip(sent, named, strict=True)]
+            marks += [_sent(one, name) for one, name in zip(sent, named, strict=True)]
             for robot in network.robots:
                 arrivals = self._arrivals[index, robot.slot]
                 arrivals.flush()
                 lane = f"net{index}/robot{robot.slot} hears"
-                found += _fates(lane, sent, named, arrivals.all, delay, self.world.tick)
-            found += _answers(heard, self._at_pc[index], index)
-            found += [_action(event) for event in self._at_pc[index] if event.what != "answer"]
-        return found
+                marks += _fates(lane, sent, named, arrivals.all, delay, self.world.tick)
+            marks += _answers(received, self._at_pc[index], index)
+            marks += [_action(event) for event in self._at_pc[index] if event.what != "answer"]
+        return marks
 
 
 def lanes_of(marks: Sequence[LinkMark]) -> list[str]:
@@ -165,17 +165,17 @@ def _fates(
     over_tick: int,
 ) -> list[LinkMark]:
     """The result of each transmission; characters that belong to none are noise."""
-    begins = [one.tick + delay - SLACK_TICKS for one in sent]
-    ends = [one.tick + delay + len(one.data) * HOST_CHARACTER_TICKS + SLACK_TICKS for one in sent]
+    begins = [arrival.tick + delay - SLACK_TICKS for arrival in sent]
+    ends = [arrival.tick + delay + len(arrival.data) * HOST_CHARACTER_TICKS + SLACK_TICKS for arrival in sent]
     damaged: dict[int, int] = {}  # transmission -> characters of it in no frame
     frames: dict[int, bool] = {}  # ... -> whether the frame was fresh
     marks = []
-    for one in arrivals:
-        if one.fresh is not None:
-            frames[bisect_right(begins, one.ticks[-1]) - 1] = one.fresh
+    for arrival in arrivals:
+        if arrival.fresh is not None:
+            frames[bisect_right(begins, arrival.ticks[-1]) - 1] = arrival.fresh
             continue
         noise: list[int] = []
-        for tick in one.ticks:
+        for tick in arrival.ticks:
             number = bisect_right(begins, tick) - 1
             if number >= 0 and tick <= ends[number]:
                 damaged[number] = damaged.get(number, 0) + 1
@@ -194,14 +194,14 @@ def _fates(
 
 def _together(ticks_of: Sequence[int]) -> list[tuple[int, int, int]]:
     """Begin, end and number of characters that come close to each other."""
-    found: list[tuple[int, int, int]] = []
+    spans: list[tuple[int, int, int]] = []
     for tick in ticks_of:
         end = tick + ROBOT_CHARACTER_TICKS
-        if found and tick - found[-1][1] <= TOGETHER_TICKS:
-            found[-1] = (found[-1][0], end, found[-1][2] + 1)
+        if spans and tick - spans[-1][1] <= TOGETHER_TICKS:
+            spans[-1] = (spans[-1][0], end, spans[-1][2] + 1)
         else:
-            found.append((tick, end, 1))
-    return found
+            spans.append((tick, end, 1))
+    return spans
 
 
 def _fate(fresh: bool | None, damaged: int, at_the_end: bool) -> str:
@@ -212,17 +212,17 @@ def _fate(fresh: bool | None, damaged: int, at_the_end: bool) -> str:
     return "damaged" if damaged else "lost"
 
 
-def _answers(heard: Sequence[Transmission], events: Sequence[Event], network: int) -> list[LinkMark]:
+def _answers(received: Sequence[Transmission], events: Sequence[Event], network: int) -> list[LinkMark]:
     """What the PC heard: characters without a valid answer are a damaged one, or too few for that, noise."""
     answers = [(event.tick, _said(event.frame, 3)) for event in events if event.frame is not None]
     marks = []
-    for one in heard:
-        end = one.tick + len(one.data) * ROBOT_CHARACTER_TICKS
-        within = [text for tick, text in answers if one.tick <= tick <= end + SLACK_TICKS]
-        enough = len(one.data) >= TELEMETRY.wire_size // 2
+    for transmission in received:
+        end = transmission.tick + len(transmission.data) * ROBOT_CHARACTER_TICKS
+        within = [text for tick, text in answers if transmission.tick <= tick <= end + SLACK_TICKS]
+        enough = len(transmission.data) >= TELEMETRY.wire_size // 2
         kind = "answer" if within else "damaged" if enough else "noise"
-        who = ", ".join(within) or f"{_characters(len(one.data))}, no valid answer"
-        marks.append(LinkMark(f"net{network} PC hears", kind, one.tick, end, who))
+        who = ", ".join(within) or f"{_characters(len(transmission.data))}, no valid answer"
+        marks.append(LinkMark(f"net{network} PC hears", kind, transmission.tick, end, who))
     return marks
 
 

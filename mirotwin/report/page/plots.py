@@ -79,9 +79,9 @@ def _errors(tracks: PageTracks, times: Any, label: str, band: float, value_of: C
     shaded = BoxAnnotation(bottom=low, top=band, fill_alpha=1.0, line_color=None, level="underlay")
     made.add_layout(tagged(shaded, fill_color="band"))
     for number, robot in enumerate(tracks.robots):
-        seen = {"t": _times(robot.measured_errors.ticks), "value": value_of(robot.measured_errors)}
+        points = {"t": _times(robot.measured_errors.ticks), "value": value_of(robot.measured_errors)}
         dots = made.scatter(
-            "t", "value", source=ColumnDataSource(seen), size=3.5, line_color=None, fill_alpha=0.7
+            "t", "value", source=ColumnDataSource(points), size=3.5, line_color=None, fill_alpha=0.7
         )
         _of_robot(dots, number, fill_color="measured")
         truth = {"t": _times(robot.errors.ticks), "value": value_of(robot.errors)}
@@ -92,11 +92,11 @@ def _errors(tracks: PageTracks, times: Any, label: str, band: float, value_of: C
 def _speeds(tracks: PageTracks, times: Any, label: str, name: str, least: float) -> Any:
     made = panel(label, times, x_label="t [s]")
     for number, robot in enumerate(tracks.robots):
-        found = {"truth": np.array(getattr(robot, name)), "told": np.array(getattr(robot, f"told_{name}"))}
-        source = ColumnDataSource({"t": _times(tracks.ticks), **found})
+        columns = {"truth": np.array(getattr(robot, name)), "told": np.array(getattr(robot, f"told_{name}"))}
+        source = ColumnDataSource({"t": _times(tracks.ticks), **columns})
         _line(made, number, source, "told", "told", 1.4, mode="after")
         _line(made, number, source, "truth", "truth", 1.8)
-        _widen(made, number, tracks, least, found["truth"], found["told"])
+        _widen(made, number, tracks, least, columns["truth"], columns["told"])
     return made
 
 
@@ -105,14 +105,14 @@ def _wheel(tracks: PageTracks, times: Any, side: str) -> Any:
     for number, robot in enumerate(tracks.robots):
         wheel, fine = robot.wheels[side], robot.fine[side]
         period_times = _times(tracks.ticks)
-        found = {name: np.array(getattr(wheel, name)) for name in ("told", "actual")}
-        source = ColumnDataSource({"t": period_times, **found})
+        columns = {name: np.array(getattr(wheel, name)) for name in ("told", "actual")}
+        source = ColumnDataSource({"t": period_times, **columns})
         of_profile = (fine.times_s, fine.values) if len(fine.values) else (period_times, wheel.profile)
         profile = ColumnDataSource({"t": np.array(of_profile[0]), "profile": np.array(of_profile[1])})
         _line(made, number, source, "told", "told", 1.0, mode="after")
         _line(made, number, profile, "profile", "profile", 1.6)
         _line(made, number, source, "actual", "truth", 1.6)
-        _widen(made, number, tracks, LEAST_M_S, found["told"], found["actual"], of_profile[1])
+        _widen(made, number, tracks, LEAST_M_S, columns["told"], columns["actual"], of_profile[1])
     return made
 
 
@@ -137,14 +137,14 @@ def _link(marks: Sequence[LinkMark], times: Any) -> Any:
     made.ygrid[0].visible = False
     made.min_border_left = 120
     for kind, colour in KIND_COLOURS.items():
-        found = [mark for mark in marks if mark.kind == kind]
-        if not found:
+        shown = [mark for mark in marks if mark.kind == kind]
+        if not shown:
             continue
         source = ColumnDataSource(
             {
-                "lane": [mark.lane for mark in found],
-                "left": _times([mark.start_tick for mark in found]),
-                "right": _times([mark.end_tick for mark in found]),
+                "lane": [mark.lane for mark in shown],
+                "left": _times([mark.start_tick for mark in shown]),
+                "right": _times([mark.end_tick for mark in shown]),
             }
         )
         bars = made.hbar(y="lane", left="left", right="right", source=source, name=f"link:{kind}")

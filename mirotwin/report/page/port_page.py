@@ -29,12 +29,12 @@ def port_page(job: Job, quiet: bool) -> bytes:
     end_tick = len(job.recorded) * CONTROL_PERIOD_TICKS
     end_s = seconds(end_tick)
     with ProgressBar("running the twin", end_tick, quiet) as bar:
-        found = beside_twin(job, progress=bar.to)
+        comparison = beside_twin(job, progress=bar.to)
     figures = {
         f"plot-{slot}-{channel.replace(' ', '-')}": _figure(
-            pairs, channel, end_s, _marks(found.differences, slot, channel)
+            pairs, channel, end_s, _marks(comparison.differences, slot, channel)
         )
-        for slot, pairs in found.robots.items()
+        for slot, pairs in comparison.robots.items()
         for channel in SHOWN
     }
     values = {
@@ -42,9 +42,9 @@ def port_page(job: Job, quiet: bool) -> bytes:
         "firmware": job.spec.image.sha256 or "",
         "scenario": job.spec.scenario.name,
         "duration_s": end_s,
-        "found": found,
+        "found": comparison,
         "shown": SHOWN,
-        "differences": found.differences[:FIRST],
+        "differences": comparison.differences[:FIRST],
     }
     return render("port.html", figures, msgspec.json.encode({}), values)
 

@@ -124,8 +124,8 @@ def pitch_of(tracks: PageTracks) -> Pitch:
             places = _places(postures)
             corners += [(x, y) for x, y in places if math.isfinite(x + y)]
             paths.append((number, kind, " ".join(f"{x:.2f},{y:.2f}" for x, y in places)))
-        seen = [place for place in _places(robot.measured) if not math.isnan(place[0])]
-        dots.append("".join(f"M{x:.2f} {y:.2f}h0" for x, y in seen))
+        measured = [place for place in _places(robot.measured) if not math.isnan(place[0])]
+        dots.append("".join(f"M{x:.2f} {y:.2f}h0" for x, y in measured))
     left, right = min(x for x, _ in corners) - MARGIN_CM, max(x for x, _ in corners) + MARGIN_CM
     bottom, top = min(y for _, y in corners) - MARGIN_CM, max(y for _, y in corners) + MARGIN_CM
     return Pitch(f"{left:.2f} {-top:.2f} {right - left:.2f} {top - bottom:.2f}", paths, dots)
@@ -171,8 +171,8 @@ def _facts(material: Material, tracks: PageTracks) -> list[tuple[str, str, str]]
     ]
     for robot in tracks.robots[:1]:
         if robot.steered:
-            found = tracking_of(robot.errors)
-            rms = f"{found.rms_position_cm:.2f} cm, {found.rms_theta_deg:.2f}\u00b0"
+            tracking = tracking_of(robot.errors)
+            rms = f"{tracking.rms_position_cm:.2f} cm, {tracking.rms_theta_deg:.2f}\u00b0"
             facts.append((rms_name(robot.errors), rms, f"of {robot.name}, position and heading"))
             facts.append(("settling", settling_text(robot.errors), "within 3 cm and 0.15 rad"))
     return facts

@@ -33,9 +33,9 @@ class WheelTrack:
         self.told, self.profile, self.actual = column(), column(), column()
         self._position: int | None = None
 
-    def add(self, axis: Axis, told: int | None) -> None:
+    def add(self, axis: Axis, commanded: int | None) -> None:
         before, self._position = self._position, axis.real_position
-        self.told.append(NAN if told is None else told / UNITS_PER_COUNT * M_S_PER_COUNT)
+        self.told.append(NAN if commanded is None else commanded / UNITS_PER_COUNT * M_S_PER_COUNT)
         self.profile.append(axis.desired_velocity * _VELOCITY_SCALE)
         again = any(opcode in _SETS_POSITION for _, opcode, _ in axis.commands)
         if before is None or again:

@@ -55,11 +55,11 @@ class Trace:
 
     def script(self) -> tuple[ScriptItem, ...]:
         """Transmissions of hosts that have been put on the air, and actions that were done, in the order of time."""
-        found = list(self._happened)
+        items = list(self._happened)
         if self.world.in_period:
             for line in self.world.lines:
-                found += [*line.sent, *line.actions.done]
-        return tuple(sorted(found, key=lambda one: one.tick))
+                items += [*line.sent, *line.actions.done]
+        return tuple(sorted(items, key=lambda one: one.tick))
 
     def __repr__(self) -> str:
         return f"Trace({len(self._happened)} actions and transmissions up to tick {self.world.tick})"
@@ -111,9 +111,9 @@ def stream_text(
 
 def tables_of(scenario: Scenario) -> dict[str, Any]:
     """A scenario as the tables of TOML, without what is expected of it."""
-    found = _without_none(msgspec.to_builtins(without_expectations(scenario)))
-    assert isinstance(found, dict)
-    return found
+    tables = _without_none(msgspec.to_builtins(without_expectations(scenario)))
+    assert isinstance(tables, dict)
+    return tables
 
 
 def _without_none(value: Any) -> Any:

@@ -155,11 +155,11 @@ class AliveMonitor(Monitor[ActsAtAll]):
             self.judged = int(self.shown >= FRAMES)
             return
         self.decoder.gap()
-        for found in self.decoder.feed(event.data, event.tick):
-            words = words_of(found, self.subject) if isinstance(found, Received) else None
-            if isinstance(found, Received) and self.freshness.judge(found.seq, found.last_tick):
+        for reception in self.decoder.feed(event.data, event.tick):
+            words = words_of(reception, self.subject) if isinstance(reception, Received) else None
+            if isinstance(reception, Received) and self.freshness.judge(reception.seq, reception.last_tick):
                 if words is not None:
-                    end_tick = found.last_tick + HOST_CHARACTER_TICKS
+                    end_tick = reception.last_tick + HOST_CHARACTER_TICKS
                     self.waiting.append((end_tick, self.before, words))
 
     def period(self, record: RobotPeriod, tick: int) -> None:
@@ -190,12 +190,14 @@ class AliveMonitor(Monitor[ActsAtAll]):
         due = [one for one in self.resets if one <= now]
         del self.resets[: len(due)]
         commands = (*record.left.commands, *record.right.commands)
-        turns = {at for at, opcode, _ in commands if opcode == _STT and at > self.begun_tick}
-        for at in sorted(turns.union(due)):
-            if at in turns:
+        turns = {tick for tick, opcode, _ in commands if opcode == _STT and tick > self.begun_tick}
+        for tick in sorted(turns.union(due)):
+            if tick in turns:
                 self.turned = True
             elif self.turned:
-                self.fail(at, "a robot that does not begin again by itself", "the firmware reset the LM629s")
+                self.fail(
+                    tick, "a robot that does not begin again by itself", "the firmware reset the LM629s"
+                )
                 self.turned = False
 
     def _due(self, tick: int) -> list[Waiting]:

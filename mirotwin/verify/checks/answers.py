@@ -53,9 +53,9 @@ class _AnswerMonitor(Monitor[Check]):
         frame = event.frame
         if event.what == "transmitted":
             self.character(event.tick)
-            for found in self.decoder.feed_symbols([(event.value, True, event.tick - TO_TI_TICKS)]):
-                if isinstance(found, Received):
-                    self.answer(found)
+            for reception in self.decoder.feed_symbols([(event.value, True, event.tick - TO_TI_TICKS)]):
+                if isinstance(reception, Received):
+                    self.answer(reception)
         elif frame is not None and event.value and frame.type == FrameType.TEAM_ASK:
             if frame.seq % self.subject.robots == self.subject.slot:
                 self.judged += 1
@@ -107,8 +107,8 @@ class TurnMonitor(_AnswerMonitor):
 
     def answer(self, frame: Received) -> None:
         seqs = [seq for seq in (self.rule.before_seq, self.rule.last_seq) if seq >= 0]
-        asked = " or ".join(map(str, seqs)) or "none"
-        wanted = f"an answer of robot {self.subject.slot} to question {asked}"
+        allowed = " or ".join(map(str, seqs)) or "none"
+        wanted = f"an answer of robot {self.subject.slot} to question {allowed}"
         in_turn = self.rule.in_turn(frame.seq)
         try:
             message = frame.message(self.subject.robots)

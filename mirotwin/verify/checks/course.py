@@ -116,7 +116,7 @@ class CourseMonitor(Monitor[CourseCheck]):
         if tick < self.first_tick:
             return
         self.judged += 1
-        before, found = self.wrong, self.check.found(error_of(record.truth, record.reference, tick))
-        self.wrong = bool(found)
-        if found and not before:
-            self.fail(tick, self.check.wanted(), found)
+        before, reason = self.wrong, self.check.found(error_of(record.truth, record.reference, tick))
+        self.wrong = bool(reason)
+        if reason and not before:
+            self.fail(tick, self.check.wanted(), reason)

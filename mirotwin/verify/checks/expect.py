@@ -58,14 +58,14 @@ def expectations_of(scenario: Scenario | BoardScenario, origin: str) -> dict[Rob
     if isinstance(scenario, BoardScenario):
         wanted = {ALONE_ALWAYS_ON: struct_of(ALONE_ALWAYS_ON)(), **for_all}
         return {(0, 0): [check for check in wanted.values() if check is not None]}
-    found: dict[RobotId, list[Check]] = {}
+    checks: dict[RobotId, list[Check]] = {}
     for index, network in enumerate(scenario.networks):
-        for at, robot in enumerate(network.robot):
-            path = f"network[{index}].robot[{at}].expect"
+        for position, robot in enumerate(network.robot):
+            path = f"network[{index}].robot[{position}].expect"
             own = checks_of_table(scenario, origin, path, robot.expect)
             wanted = {**{name: struct_of(name)() for name in ALWAYS_ON}, **for_all, **own}
-            found[index, robot.slot] = [check for check in wanted.values() if check is not None]
-    return found
+            checks[index, robot.slot] = [check for check in wanted.values() if check is not None]
+    return checks
 
 
 def named_in(scenario: Scenario | BoardScenario) -> set[str]:
@@ -87,17 +87,17 @@ def checks_of_table(
     scenario: Scenario | BoardScenario, origin: str, path: str, table: Mapping[str, Any]
 ) -> dict[str, Check | None]:
     """The checks of one table at `path`; None for one that is not expected. Raises ScenarioError."""
-    found: dict[str, Check | None] = {}
+    checks: dict[str, Check | None] = {}
     for name, value in table.items():
         place = f"{path}.{name}"
         try:
-            found[name] = _check(_struct(name), name, value, scenario.end_tick)
+            checks[name] = _check(_struct(name), name, value, scenario.end_tick)
         except msgspec.ValidationError as error:
             raise _wrong(scenario, origin, place, name, value, f"{error}") from None
         except BadInput as error:
-            at = f"{place}.{error.place}" if error.place else place
-            raise ScenarioError(origin, at, error.what, error.remedy) from error.__cause__
-    return found
+            path_in_file = f"{place}.{error.place}" if error.place else place
+            raise ScenarioError(origin, path_in_file, error.what, error.remedy) from error.__cause__
+    return checks
 
 
 def _struct(name: str) -> type[Check]:
@@ -166,10 +166,10 @@ def _wrong(
     scenario: Scenario | BoardScenario, origin: str, place: str, name: str, value: Any, message: str
 ) -> ScenarioError:
     """What msgspec found, at the path of the scenario."""
-    what, _, inner = message.partition(" - at `$")
-    if what.startswith("Object missing required field"):
-        key = what.split("`")[1]
+    reason, _, inner = message.partition(" - at `$")
+    if reason.startswith("Object missing required field"):
+        key = reason.split("`")[1]
         example = name if key == struct_of(name).MAIN else key
         return ScenarioError(origin, place, f"{key} is missing", f"give it: {example} = ..")
     below = inner.rstrip("`") if isinstance(value, dict) else ""
-    return value_error(origin, msgspec.to_builtins(scenario), f"{what} - at `$.{place}{below}`")
+    return value_error(origin, msgspec.to_builtins(scenario), f"{reason} - at `$.{place}{below}`")

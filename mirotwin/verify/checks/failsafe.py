@@ -132,8 +132,8 @@ class SilenceMonitor(OrdersMonitor[SilenceCheck]):
         """
         if self.late is not None:
             (fresh_tick, latest_tick), self.late = self.late, None
-            found = [self._when(order, fresh_tick, tick) for order in self.orders.last.values()]
-            self.fail(latest_tick, self.wanted, ", ".join(found))
+            texts = [self._when(order, fresh_tick, tick) for order in self.orders.last.values()]
+            self.fail(latest_tick, self.wanted, ", ".join(texts))
 
     def _when(self, order: Order, fresh_tick: int, tick: int) -> str:
         if not self.check.fulfilled(order):

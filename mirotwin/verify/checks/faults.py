@@ -84,6 +84,6 @@ class Lm629Monitor(FaultMonitor):
         if refused != self.refused:
             for side, now, before in zip(SIDES, refused, self.refused, strict=True):
                 if now > before:
-                    what = f"a command error in the status of the {side} LM629"
-                    self.fail(tick, self.check.WANTED, what)
+                    reason = f"a command error in the status of the {side} LM629"
+                    self.fail(tick, self.check.WANTED, reason)
             self.refused = refused

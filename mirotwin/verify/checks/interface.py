@@ -269,12 +269,12 @@ def checked_monitor(check: Check, subject: Subject) -> Monitor[Any]:
     monitor: Any = check.monitor(subject)
     place = defined_at(check.monitor)
     if not isinstance(monitor, Monitor):
-        what = at_place(f"`monitor` returned {monitor!r:.40}", place)
-        raise PluginError(what, "return an object of a class that derives from Monitor")
+        reason = at_place(f"`monitor` returned {monitor!r:.40}", place)
+        raise PluginError(reason, "return an object of a class that derives from Monitor")
     if not hasattr(monitor, "failures"):
-        what = f"the constructor of {type(monitor).__name__} does not call that of Monitor"
+        reason = f"the constructor of {type(monitor).__name__} does not call that of Monitor"
         raise PluginError(
-            at_place(what, defined_at(type(monitor).__init__)), "call super().__init__(check, subject)"
+            at_place(reason, defined_at(type(monitor).__init__)), "call super().__init__(check, subject)"
         )
     _check_events(monitor, place)
     return monitor
@@ -295,9 +295,9 @@ def _check_events(monitor: Monitor[Any], place: str) -> None:
     name = f"EVENTS of {type(monitor).__name__}"
     if not isinstance(events, tuple | list | set | frozenset):
         raise PluginError(at_place(f"{name} is {events!r:.40}", place), f"write ({events!r:.40},)")
-    for what in events:
-        if what not in EVENT_KINDS:
-            said = at_place(f"{name} names {what!r:.40}, which is no event", place)
+    for kind in events:
+        if kind not in EVENT_KINDS:
+            reason = at_place(f"{name} names {kind!r:.40}, which is no event", place)
             raise PluginError(
-                said, did_you_mean(str(what), EVENT_KINDS, f"there are {', '.join(EVENT_KINDS)}")
+                reason, did_you_mean(str(kind), EVENT_KINDS, f"there are {', '.join(EVENT_KINDS)}")
             )

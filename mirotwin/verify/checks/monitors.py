@@ -112,10 +112,10 @@ class Checks:
         self.index += 1
         self.untold.append((period, self.world.tick))
         try:  # without a call that could be saved: after a simulated period the caches hold nothing of this
-            for told in self.at_ends:
-                told[1].period_over()
+            for judge_and_monitor in self.at_ends:
+                judge_and_monitor[1].period_over()
         except (Exception, SystemExit) as error:
-            raise told[0].cannot_judge(told[1].check, error) from error
+            raise judge_and_monitor[0].cannot_judge(judge_and_monitor[1].check, error) from error
         if len(self.untold) >= self.together:
             self._tell()
 
@@ -178,10 +178,10 @@ class Checks:
         """Of all checks together. Those that are always on, and are named by nobody, need no occasion."""
         faults = ["fault" for one in self.failures if one.fault]
         named = () if self.ended_early else self.named
-        found = self.verdicts()
+        verdicts = self.verdicts()
         return judge(
-            [*faults, *(one.verdict for one in found if one.name in named)],
-            (one.verdict for one in found if one.name not in named),
+            [*faults, *(one.verdict for one in verdicts if one.name in named)],
+            (one.verdict for one in verdicts if one.name not in named),
         )
 
 
@@ -263,20 +263,20 @@ class _DeviceMonitors:
 
     def _tell(self, tick: int) -> None:
         """Tells of the events before `tick`, in the order of time."""
-        told = 0
+        delivered = 0
         for event in self.waiting:
             if event.tick >= tick:
                 break
-            told += 1
+            delivered += 1
             if event.what in _RESTARTS:
                 if event.slot != self.device.slot:
                     continue
                 self._restart(event.tick)
             self._tell_one(event)
             if event.what == "received" and self.receiver is not None:
-                for heard in self.receiver.character(event.value, event.good_stop, event.tick):
-                    self._tell_one(reception(event, *heard))
-        del self.waiting[:told]
+                for received in self.receiver.character(event.value, event.good_stop, event.tick):
+                    self._tell_one(reception(event, *received))
+        del self.waiting[:delivered]
         for monitor in self.of_times:
             self.check = monitor.check
             monitor.until(tick)

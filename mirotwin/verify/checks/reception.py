@@ -95,21 +95,21 @@ class SentMonitor(OrdersMonitor[AcceptsOnlySent]):
             self.ordered_tick = event.tick
 
     def _note_sent(self, event: Event) -> None:
-        for found in self.decoder.feed(event.data, event.tick):
-            words = words_of(found, self.subject) if isinstance(found, Received) else None
+        for reception in self.decoder.feed(event.data, event.tick):
+            words = words_of(reception, self.subject) if isinstance(reception, Received) else None
             if words is not None:
-                self.rule.team(found.start_tick, *words)
+                self.rule.team(reception.start_tick, *words)
 
     def until(self, tick: int) -> None:
         if self.ordered_tick is None or tick <= self.ordered_tick:
             return
-        at, self.ordered_tick = self.ordered_tick, None
+        order_tick, self.ordered_tick = self.ordered_tick, None
         self.judged += 1
         words = self.orders.words()
-        if not self.rule.allows(at, *words):
+        if not self.rule.allows(order_tick, *words):
             wanted = f"velocities that the host sent in the last {self.check.within_ms:g} ms"
             left, right = (None if word == NO_WORD else word for word in words)
-            self.fail(at, wanted, f"{left}, {right} (left, right)")
+            self.fail(order_tick, wanted, f"{left}, {right} (left, right)")
 
     def end(self, tick: int) -> None:
         self.until(tick + 1)

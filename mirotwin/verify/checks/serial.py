@@ -79,5 +79,5 @@ class NeverSleepsMonitor(Monitor[NeverSleeps]):
         else:
             self.judged += 1
             if not sleep.slept:
-                what = "the firmware is awake long after the last character"
-                self.fail(cpu.cycles * CYCLE_TICKS, "", what)
+                reason = "the firmware is awake long after the last character"
+                self.fail(cpu.cycles * CYCLE_TICKS, "", reason)

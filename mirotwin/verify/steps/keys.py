@@ -136,8 +136,8 @@ class SendFrame(Send, frozen=True, kw_only=True):
             if not 0 <= bit < bits:
                 return f"wrong_bits: bit {bit} is out of range 0..{bits - 1}, the bits from HDR to CRC"
         if sorted({*range(form.wire_size)}.intersection(self.bad_stop)) != [*self.bad_stop]:
-            what = f"bad_stop: {[*self.bad_stop]} are not characters of the frame in their order"
-            return f"{what}; use 0 to {form.wire_size - 1}"
+            reason = f"bad_stop: {[*self.bad_stop]} are not characters of the frame in their order"
+            return f"{reason}; use 0 to {form.wire_size - 1}"
         return beyond(self.slot, network.robots)
 
     def do(self, player: Player) -> None:
@@ -169,15 +169,15 @@ class SendTeam(SendFrame, frozen=True, kw_only=True, tag="team"):
         if self.team_m_s is not None and len(self.team_m_s) != network.robots:
             pairs = amount(len(self.team_m_s), "pair")
             return f"team_m_s: {pairs} for {network.robots} slots; give one pair [left, right] a slot"
-        one = (self.slot, self.left_m_s, self.right_m_s)
-        if self.team_m_s is not None and one != (None, None, None):
+        single_robot = (self.slot, self.left_m_s, self.right_m_s)
+        if self.team_m_s is not None and single_robot != (None, None, None):
             return "team_m_s: tells all slots; leave out slot, left_m_s and right_m_s"
         return super().problem(network)
 
     def frame(self, host: Host, slot: int, seq: int) -> TeamFrame:
         host.command(slot, self.left_m_s, self.right_m_s)
-        for at, (left, right) in enumerate(self.team_m_s or ()):
-            host.command(at, left, right)
+        for slot_of_pair, (left, right) in enumerate(self.team_m_s or ()):
+            host.command(slot_of_pair, left, right)
         return host.team(self.ask, seq)
 
 

@@ -154,8 +154,8 @@ class Player:
             except ValueError as error:
                 if isinstance(error, ScenarioError):
                     raise
-                what, _, remedy = f"{error}".removeprefix(f"{self.origin}: ").partition("; ")
-                raise ScenarioError(self.origin, f"step {step.number}", what, remedy) from error
+                reason, _, remedy = f"{error}".removeprefix(f"{self.origin}: ").partition("; ")
+                raise ScenarioError(self.origin, f"step {step.number}", reason, remedy) from error
             self.done += 1
 
     def finish(self) -> None:
@@ -181,28 +181,28 @@ class Player:
         if from_now:
             self._forget()
         until_tick = NEVER_TICK if within_ms is None else machine.tick + ms_ticks(within_ms)
-        said = f"{wanted}" if within_ms is None else f"{wanted} within {within_ms:g} ms"
-        seen: list[Event] = []
-        event = self._next(kind, until_tick, seen)
+        awaited = f"{wanted}" if within_ms is None else f"{wanted} within {within_ms:g} ms"
+        earlier: list[Event] = []
+        event = self._next(kind, until_tick, earlier)
         if event is None:
-            raise _Failed(machine.tick, said, self._nothing(wanted, seen), True)
+            raise _Failed(machine.tick, awaited, self._nothing(wanted, earlier), True)
         if kind != wanted and not wanted.met_by(event):
-            raise _Failed(event.tick, said, self._other(wanted, event))
+            raise _Failed(event.tick, awaited, self._other(wanted, event))
 
     def hold(self, condition: Condition, for_ms: float, never: bool) -> None:
         """Watches for `for_ms`: the wheels have to keep their speeds, or the condition must `never` become true."""
-        machine, forbidden, said = self.machine, condition, f"no {condition}"
+        machine, forbidden, required = self.machine, condition, f"no {condition}"
         if isinstance(condition, WheelSpeeds) and not never:
             holds = condition.predicate
             forbidden = When(
                 network=condition.network, slot=condition.slot, predicate=lambda robot: not holds(robot)
             )
-            said = f"{condition}"
+            required = f"{condition}"
         self._forget()
         until_tick = machine.tick + ms_ticks(for_ms)
         event = self._next(forbidden, until_tick, [])
         if event is not None:
-            raise _Failed(event.tick, f"{said} for {for_ms:g} ms", self._other(condition, event))
+            raise _Failed(event.tick, f"{required} for {for_ms:g} ms", self._other(condition, event))
         if machine.tick < until_tick:
             raise _Failed(machine.tick, f"{for_ms:g} ms of it", self._end())
 
@@ -211,8 +211,8 @@ class Player:
         self.machine.waits.collect()
         self.machine.waits.pass_over()
 
-    def _next(self, condition: Condition, until_tick: int, seen: list[Event]) -> Event | None:
-        """The next event for which `condition` is true, up to `until_tick`; `seen` gets those before it."""
+    def _next(self, condition: Condition, until_tick: int, earlier: list[Event]) -> Event | None:
+        """The next event for which `condition` is true, up to `until_tick`; `earlier` gets those before it."""
         machine = self.machine
         while True:
             stop_tick = min(until_tick, self._next_tick())
@@ -220,8 +220,8 @@ class Player:
             try:
                 return machine.run_until(condition, within=within)
             except WaitExpired as expired:
-                seen += expired.seen
-                del seen[:-SEEN_AT_MOST]
+                earlier += expired.seen
+                del earlier[:-SEEN_AT_MOST]
             if machine.finished or machine.tick >= until_tick:
                 return None
             self._top_up()
@@ -259,27 +259,27 @@ class Player:
         stopped = "a firmware fault has stopped the run" if self.machine.stopped else "the run is over"
         return f"that {stopped}"
 
-    def _nothing(self, wanted: Condition, seen: Sequence[Event]) -> str:
+    def _nothing(self, wanted: Condition, earlier: Sequence[Event]) -> str:
         """The text of what happened instead of the event that was wanted."""
-        found = [self._end()] if self.machine.finished else []
+        parts = [self._end()] if self.machine.finished else []
         if isinstance(wanted, WheelSpeeds):
-            found.append(self._speeds(wanted))
-        found.append(_meanwhile(seen))
-        return "; ".join(found)
+            parts.append(self._speeds(wanted))
+        parts.append(_meanwhile(earlier))
+        return "; ".join(parts)
 
     def _other(self, wanted: Condition, event: Event) -> str:
         """The event that came instead."""
         if isinstance(wanted, WheelSpeeds):
             return self._speeds(wanted)
-        _, _, said = f"{event}".partition(": ")
+        _, _, text = f"{event}".partition(": ")
         if isinstance(wanted, Answer):
             shown = [
                 f"{key} = {str(value).lower()}"
                 for key, value in answer_fields(event).items()
                 if key == "slot" or getattr(wanted, key) is not None
             ]
-            said = f"{said} with {', '.join(shown)}"
-        return said
+            text = f"{text} with {', '.join(shown)}"
+        return text
 
     def _speeds(self, wanted: WheelSpeeds) -> str:
         robot = self.machine.robot(wanted.network, self.slot(wanted.slot, wanted.network))
@@ -287,9 +287,9 @@ class Player:
         return f"left_m_s = {left:.4f}, right_m_s = {right:.4f}"
 
 
-def _meanwhile(seen: Sequence[Event]) -> str:
+def _meanwhile(earlier: Sequence[Event]) -> str:
     """The events of a wait in one line: the count of each kind, and the last event."""
-    events = [event for event in seen if event.what != "true"]
+    events = [event for event in earlier if event.what != "true"]
     if not events:
         return "nothing happened meanwhile"
     counted = Counter(event.what for event in events)
@@ -312,5 +312,5 @@ def check_symbols(steps: Sequence[Step], image: Image, origin: str) -> None:
         try:
             image.code_address(condition.symbol)
         except BadInput as error:
-            what = f"{error.what} of {image.path}"
-            raise ScenarioError(origin, f"step {step.number}.symbol", what, error.remedy) from None
+            reason = f"{error.what} of {image.path}"
+            raise ScenarioError(origin, f"step {step.number}.symbol", reason, error.remedy) from None

@@ -53,13 +53,13 @@ def check_order(steps: Sequence[Step], scenario: Scenario, origin: str) -> None:
         last = begins + max(step.lasts_ticks, ms_ticks(getattr(step, "within_ms", None) or 0.0))
         if begins >= end or last > end:
             goes = f" and goes on to {in_ms(last)}" if last > begins else ""
-            what = f"begins after {in_ms(begins)} or later{goes}, but the run ends after {in_ms(end)}"
-            raise ScenarioError(origin, place, what, "give a longer duration_s, or shorter times")
+            reason = f"begins after {in_ms(begins)} or later{goes}, but the run ends after {in_ms(end)}"
+            raise ScenarioError(origin, place, reason, "give a longer duration_s, or shorter times")
         begins += step.lasts_ticks
         if isinstance(step, SaveStep):
             if step.save in saved:
-                what = f"step {saved[step.save]} saves {step.save}, too"
-                raise ScenarioError(origin, f"{place}.save", what, "give each its own name")
+                reason = f"step {saved[step.save]} saves {step.save}, too"
+                raise ScenarioError(origin, f"{place}.save", reason, "give each its own name")
             saved[step.save] = step.number
 
 
@@ -87,10 +87,10 @@ class _Table:
         if step.network >= len(networks):
             known = use_one_of(map(str, range(len(networks))))
             self.refuse("network", f"there is no network {step.network}", known)
-        what, _, remedy = step.problem(networks[step.network]).partition("; ")
-        if what:
-            key, _, rest = what.partition(": ")
-            self.refuse(key if rest else "", rest or what, remedy)
+        reason, _, remedy = step.problem(networks[step.network]).partition("; ")
+        if reason:
+            key, _, rest = reason.partition(": ")
+            self.refuse(key if rest else "", rest or reason, remedy)
         return step
 
     def _step(self, verb: str) -> Step:
@@ -125,8 +125,8 @@ class _Table:
         event = value.get("event") if isinstance(value, dict) else None  # as `[expect]` has a condition
         if isinstance(event, str) and event in choices:
             self.refuse(verb, "expected a name", f'write {verb} = "{event}", and its other keys beside it')
-        what = f"{value!r} is not one of the choices"
-        self.refuse(verb, what, use_one_of(choices))
+        reason = f"{value!r} is not one of the choices"
+        self.refuse(verb, reason, use_one_of(choices))
 
     def refuse_unknown(self, verb: str, known: Sequence[str]) -> None:
         for key in self.table:
@@ -142,13 +142,15 @@ class _Table:
         try:
             return msgspec.convert(dict(given), struct)
         except msgspec.ValidationError as error:
-            what, _, path = f"{error}".partition(" - at `$")
+            reason, _, path = f"{error}".partition(" - at `$")
             path = path.rstrip("`").removeprefix(".condition")
             raw = {"step": [dict(table) for table in self.scenario.step]}
-            found = value_error(self.origin, raw, f"{what} - at `$.step[{self.index}]{path}`")
-            place = re.sub(r"^step\[\d+\]\.?", "", f"{found.place}")
+            converted = value_error(self.origin, raw, f"{reason} - at `$.step[{self.index}]{path}`")
+            place = re.sub(r"^step\[\d+\]\.?", "", f"{converted.place}")
             self.refuse(
-                place, found.what, found.remedy or choices_of(struct, place) or choices_of(kind, place)
+                place,
+                converted.what,
+                converted.remedy or choices_of(struct, place) or choices_of(kind, place),
             )
 
     def with_checks(self, step: CheckStep) -> CheckStep:
@@ -161,6 +163,6 @@ class _Table:
 
     # What is wrong
 
-    def refuse(self, key: str, what: str, remedy: str = "") -> NoReturn:
+    def refuse(self, key: str, reason: str, remedy: str = "") -> NoReturn:
         place = f"step {self.index + 1}"
-        raise ScenarioError(self.origin, f"{place}.{key}" if key else place, what, remedy)
+        raise ScenarioError(self.origin, f"{place}.{key}" if key else place, reason, remedy)
