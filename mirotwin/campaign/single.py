@@ -66,7 +66,7 @@ def run_single(job: Work) -> RunOutcome:
 def _run(job: Work) -> RunOutcome:
     image = image_of(job.firmware)
     text, expected, steps = prepared(job.origin, job.text, job.settings)
-    spec = replace(RunSpec.of(text, image, job.seed, steps), expected=expected)
+    spec = replace(RunSpec.of(text, image, job.seed), expected=expected, steps=steps)
     run = Run(spec)
     tracks = Tracks(delay_frames=text.scenario.camera.delay_frames)
     began_s = perf_counter()

@@ -48,7 +48,7 @@ from mirotwin.shell.program import Terminated, complain, show_line
 from mirotwin.shell.progress import ProgressBar
 from mirotwin.shell.times import Time, TimeType, wall_time
 from mirotwin.shell.verdicts import VERDICTS
-from mirotwin.verify.checks.expect import expectations_of
+from mirotwin.verify.checks.expect import expectations_in
 from mirotwin.verify.expectations import EXPECT, as_settings, in_files, table_alone
 
 if TYPE_CHECKING:
@@ -355,8 +355,9 @@ def _expected(options: FuzzOptions) -> dict[str, Any]:
     """The checks of --expect as a table. Raises BadInput for one that there is not, or with wrong parameters."""
     if options.bare:
         return table_alone(options.expected, "fuzz")
-    settings = as_settings(options.expected)
-    return dict(changed(silent_scenario(()), "fuzz", settings, expectations_of).expect) if settings else {}
+    text = changed(silent_scenario(()), "fuzz", as_settings(options.expected))
+    expectations_in(text)
+    return dict(text.scenario.expect)
 
 
 def _covering(symbol: str | None, image: Image) -> Covering | None:

@@ -7,8 +7,10 @@ from pathlib import Path
 from selectors import DefaultSelector
 from typing import Annotated
 
+from msgspec.structs import replace
+
 from miro_exact.clock import ticks
-from miro_sim.scenario.file import LONGEST_S, live_scenario
+from miro_sim.scenario.file import LONGEST_S, for_session, lasting
 from mirotwin.ports.serve_ports import PortOptions, open_ports
 from mirotwin.ports.session import FASTEST, Pace, Session
 from mirotwin.recording.recorder import source_of
@@ -34,7 +36,7 @@ from mirotwin.shell.outputs import FILES, KEPT, RECORDING, OutputFolder
 from mirotwin.shell.program import complain, show_line, tell_notes
 from mirotwin.shell.progress import ProgressBar
 from mirotwin.shell.times import Time, TimeType
-from mirotwin.verify.checks.expect import expectations_of
+from mirotwin.verify.checks.expect import expectations_in
 from mirotwin.verify.expectations import Expected, as_settings
 
 CASE = "case.stream"
@@ -82,7 +84,8 @@ def serve(options: ServeOptions) -> int:
     Exit code 1: a check failed; 3: the firmware did what it must not.
     """
     seed, settings = options.seed, (*options.settings, *as_settings(options.expected))
-    text = live_scenario(options.scenario, settings, expectations_of)
+    own = for_session(options.scenario, settings)
+    expected, text = expectations_in(own), lasting(own)
     tell_notes(text.notes)
     default = Path("runs") / f"{text.scenario.name}-{seed}-live"
     folder = OutputFolder(
@@ -90,7 +93,7 @@ def serve(options: ServeOptions) -> int:
     )
     image = load_firmware(options.firmware)
     with plain_parameters(text.origin):
-        run = Run.traced(RunSpec.of(text, image, seed))
+        run = Run.traced(replace(RunSpec.of(text, image, seed), expected=expected))
     world = run.world
     run_files = RunFiles(folder, source_of(text, world), run, text.settings)
 

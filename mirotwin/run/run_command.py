@@ -9,7 +9,6 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 import click
-from msgspec.structs import replace
 
 from miro_exact.bad_input import BadInput
 from miro_sim.scenario.file import load
@@ -25,8 +24,9 @@ from mirotwin.shell.options import plain_parameters
 from mirotwin.shell.outputs import FILES, OutputFolder
 from mirotwin.shell.program import complain, tell_notes
 from mirotwin.shell.progress import ProgressBar
+from mirotwin.verify.checks.expect import expectations_in
 from mirotwin.verify.expectations import as_settings
-from mirotwin.verify.steps.reading import everything, steps_of
+from mirotwin.verify.steps.reading import steps_in
 
 if TYPE_CHECKING:
     from mirotwin.camera.view import View
@@ -56,9 +56,9 @@ def run(options: RunOptions) -> int:
     not.
     """
     seed, record = options.seed, options.record
-    text = load(options.scenario, (*options.settings, *as_settings(options.expected)), everything)
+    text = load(options.scenario, (*options.settings, *as_settings(options.expected)))
+    expected, steps = expectations_in(text), steps_in(text)
     tell_notes(text.notes)
-    steps = steps_of(text.scenario, text.origin)
     if steps and record == "full":
         raise click.UsageError(f"--record full does not go with the steps of {options.scenario}.")
     stops = Stops(options.save_at, options.to_time, options.resume)
@@ -72,7 +72,15 @@ def run(options: RunOptions) -> int:
     earlier = "" if options.out is not None else digest_in(folder.path)
     image = load_firmware(options.firmware, stack_from=options.stack_from)
 
-    spec = replace(RunSpec.of(text, image, seed, steps), cut=stops.to_tick is not None)
+    spec = RunSpec(
+        scenario=text.scenario,
+        image=image,
+        seed=seed,
+        expected=expected,
+        steps=steps,
+        cut=stops.to_tick is not None,
+        origin=text.origin,
+    )
     with plain_parameters(text.origin):
         world = spec.world()
         stops.begin(world)

@@ -28,9 +28,8 @@ from mirotwin.shell.outputs import RECORDING, OutputFolder, write_files
 from mirotwin.shell.verdicts import judge
 from mirotwin.verify.cases.artifacts import nothing_left
 from mirotwin.verify.cases.case import tables_of
-from mirotwin.verify.steps.keys import ConditionStep
+from mirotwin.verify.steps.keys import ConditionStep, Step
 from mirotwin.verify.steps.player import Player
-from mirotwin.verify.steps.reading import steps_of
 
 LATE_MS = 2.0
 _TWIN = (
@@ -44,7 +43,7 @@ _TWIN = (
 
 def twin_source(scenario: Scenario, seed: int, image: Image, firmware: bytes = b"") -> RunSource:
     """What the twin of robots at a port is made from; `firmware`: the file of an image that is not on the disk."""
-    twin = changed(scenario, scenario.name, [*live_settings(scenario), *_TWIN])
+    twin = changed(scenario, scenario.name, [*live_settings(scenario), *_TWIN]).scenario
     return RunSource(
         scenario_name=twin.name,
         scenario_text=tomli_w.dumps(tables_of(twin)),
@@ -123,7 +122,7 @@ def beside_twin(
 
 
 def play_at_port(
-    text: ScenarioText, path: str, image: Image, desk: DeskOptions, folder: Path | None
+    text: ScenarioText, steps: Sequence[Step], image: Image, desk: DeskOptions, folder: Path | None
 ) -> Result:
     """A scenario file as a test of a robot at a port: the steps that a PC can do and see, one after the other.
 
@@ -131,10 +130,10 @@ def play_at_port(
     left out without changing what follows: the test ends there. Neither passes; they are counted as not observable.
     `folder`: where the recording is left. Raises NotObservable.
     """
-    recording, notes, left = BytesIO(), list[str](), False
+    path, recording, notes, left = text.origin, BytesIO(), list[str](), False
     with port_for_test(desk, text.scenario, path, notes.append) as port:
         port.record(recording, twin_source(text.scenario, 0, image))
-        player = Player(port, steps_of(text.scenario, path), path)
+        player = Player(port, steps, path)
         player.play()
         tick = port.tick
     expected = [why_not(port, f"expectation {name}", "inside") for name in text.scenario.expect]

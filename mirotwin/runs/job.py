@@ -24,8 +24,7 @@ from miro_sim.periods import Period
 from miro_sim.radio.params import Radio
 from miro_sim.scenario.board import BoardScenario
 from miro_sim.scenario.errors import ScenarioError
-from miro_sim.scenario.file import builtin_names, changed, load, of_table
-from miro_sim.scenario.file import parse as parse_scenario
+from miro_sim.scenario.file import builtin_names, changed, load, of_table, of_text
 from miro_sim.scenario.keys import MAX_NETWORKS, NetworkSpec, Scenario
 from miro_sim.scenario.settings import EXPECT, blamed, in_text, make
 from miro_sim.world.machine import no_network
@@ -45,7 +44,7 @@ from mirotwin.shell.options import plain_parameters
 from mirotwin.shell.outputs import RECORDING
 from mirotwin.shell.verdicts import judge
 from mirotwin.verify.cases.artifacts import image_beside
-from mirotwin.verify.checks.expect import expectations_of
+from mirotwin.verify.checks.expect import expectations_in, expectations_of
 
 DEFAULT_SCENARIO = "fig6"
 AFTERMATH_TICKS = TICKS_PER_SECOND
@@ -300,7 +299,7 @@ def recorded_spec(recording: Recording, path: str, image: Image | None = None) -
     """Sends again what the recorded hosts sent, on `image` (None: the recorded one). Raises BadInput."""
     source = recording.source
     with BadInput.at(f"{path}: {SCENARIO_ATTACHMENT}"):
-        scenario = parse_scenario(source.scenario_text, "")
+        scenario = of_text(source.scenario_text, "").scenario
     return RunSpec(
         scenario=scenario,
         image=image or image_of(recording, path),
@@ -362,8 +361,8 @@ def _job_of_recording(
             raise
     as_recorded = recorded_spec(recording, path, image or runs_on)
     with BadInput.at(f"{path}: {SCENARIO_ATTACHMENT}"):
-        scenario = parse_scenario(source.scenario_text, "", settings, expectations_of)
-        expected = expectations_of(scenario, "")
+        text = of_text(source.scenario_text, "", settings)
+        scenario, expected = text.scenario, expectations_in(text)
     with BadInput.at(path):
         check_script(as_recorded.script or (), scenario)
     as_it_was = image is not None and not settings and seed in (None, source.seed)
@@ -396,12 +395,15 @@ def _job_of_stream(
     script, own = script_of_stream(sent), header.seed or 0
     with BadInput.at(path):
         written = scenario_of_stream(sent, header)
-        scenario = changed(written, "", [*keys, *settings], expectations_of)
-        expected = expectations_of(scenario, "")
+        text = changed(written, "", [*keys, *settings])
+        scenario, expected = text.scenario, expectations_in(text)
         check_script(script, scenario)
-        as_written = changed(written, "", keys, expectations_of) if settings else scenario
+        as_written = text
+        if settings:
+            as_written = changed(written, "", keys)
+            expectations_in(as_written)
     other = header.firmware_sha256 not in (None, image.sha256) or seed not in (None, own)
-    other = other or scenario != as_written
+    other = other or scenario != as_written.scenario
     spec = RunSpec(
         scenario=scenario,
         image=image,

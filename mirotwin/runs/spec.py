@@ -48,9 +48,9 @@ class RunSpec(msgspec.Struct, frozen=True, kw_only=True):
     origin: str = ""
 
     @classmethod
-    def of(cls, text: ScenarioText, image: Image, seed: int = 0, steps: Sequence[Step] = ()) -> RunSpec:
+    def of(cls, text: ScenarioText, image: Image, seed: int = 0) -> RunSpec:
         """Of a scenario that was read."""
-        return cls(scenario=text.scenario, image=image, seed=seed, steps=steps, origin=text.origin)
+        return cls(scenario=text.scenario, image=image, seed=seed, origin=text.origin)
 
     def checks(self) -> Expected:
         """What is expected of each robot. Raises ScenarioError."""

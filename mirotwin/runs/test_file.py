@@ -22,7 +22,8 @@ from mirotwin.runs.spec import RunSpec
 from mirotwin.verify.cases.artifacts import clear, leave, nothing_left, report_line, stream_files
 from mirotwin.verify.cases.case import SUFFIX as CASE_SUFFIX
 from mirotwin.verify.cases.case import is_case
-from mirotwin.verify.steps.reading import everything, steps_of
+from mirotwin.verify.checks.expect import expectations_in
+from mirotwin.verify.steps.reading import steps_in
 
 SCENARIO = "scenario.toml"
 """The whole scenario with all that was set, in the folder of a file that failed."""
@@ -70,18 +71,18 @@ def _run(
     again: Callable[[bool], str],
     desk: DeskOptions | None,
 ) -> Result:
-    text = load(path, settings, everything)
+    text = load(path, settings)
+    expected, steps = expectations_in(text), steps_in(text)
     if desk is not None and desk.port:
         from mirotwin.runs.at_port import play_at_port  # loads pyserial
 
-        return replace(play_at_port(text, path, image, desk, folder), again=again(False))
-    steps = steps_of(text.scenario, path)
+        return replace(play_at_port(text, steps, image, desk, folder), again=again(False))
     saving = [step for step in steps if step.VERB == "save"]
     if saving and folder is None:
         raise BadInput(
             path, f"step {saving[0].number}", "there is no folder to save into", "give --artifacts DIR"
         )
-    spec = RunSpec.of(text, image, seed, steps)
+    spec = replace(RunSpec.of(text, image, seed), expected=expected, steps=steps)
     run = Run(spec) if folder is None else Run.traced(spec)
     case = None
     if run.player is not None:

@@ -13,7 +13,6 @@ from miro_protocol.whitening import whiten
 from miro_robot.lm629.options import DEFAULT_OPTIONS
 from miro_sim.scenario.file import parse
 from miro_sim.world.world import World
-from mirotwin.verify.checks.expect import expectations_of
 from mirotwin.verify.checks.monitors import Checks
 
 FORMAT = downlink(3)
@@ -86,7 +85,7 @@ def words(left, right):
 def verdicts(image, heard, busy_clocks=DEFAULT_OPTIONS.busy_clocks):
     """By the name of the check, 600 ms after the last thing."""
     text = _SILENT.format(seconds=_length_s(heard), busy_clocks=busy_clocks)
-    scenario = parse(text, "silent", (), expectations_of)
+    scenario = parse(text, "silent")
     world = World(scenario, 0, image, heard)
     checks = Checks(world)
     while not world.finished:

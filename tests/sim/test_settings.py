@@ -104,8 +104,8 @@ def test_several_robots_are_told_apart_by_index():
 
 
 def test_a_scenario_that_stands_in_no_file_takes_settings_too():
-    assert changed(FIG6, "x", []) is FIG6
-    assert changed(FIG6, "x", ["duration_s=2"]) == msgspec.structs.replace(FIG6, duration_s=2.0)
+    assert changed(FIG6, "x", []).scenario is FIG6
+    assert changed(FIG6, "x", ["duration_s=2"]).scenario == msgspec.structs.replace(FIG6, duration_s=2.0)
     with pytest.raises(ScenarioError, match=r"x: --set duration_s=0: 0 is out of range; must be > 0"):
         changed(FIG6, "x", ["duration_s=0"])
 

@@ -23,6 +23,7 @@ from miro_exact.raised import raised
 from miro_sim.periods import RobotId
 from miro_sim.scenario.board import BoardScenario
 from miro_sim.scenario.errors import Refused, ScenarioError, remedy_for_key, value_error
+from miro_sim.scenario.file import ScenarioText
 from miro_sim.scenario.keys import Scenario
 from mirotwin.verify.checks import OWN
 from mirotwin.verify.checks.interface import Check, problem_of_class
@@ -66,6 +67,14 @@ def expectations_of(scenario: Scenario | BoardScenario, origin: str) -> dict[Rob
             wanted = {**{name: struct_of(name)() for name in ALWAYS_ON}, **for_all, **own}
             checks[index, robot.slot] = [check for check in wanted.values() if check is not None]
     return checks
+
+
+def expectations_in(text: ScenarioText) -> dict[RobotId, list[Check]]:
+    """Those of a scenario that was read; an error names the setting that it concerns."""
+    try:
+        return expectations_of(text.scenario, text.origin)
+    except ScenarioError as error:
+        raise text.blamed(error) from error.__cause__
 
 
 def named_in(scenario: Scenario | BoardScenario) -> set[str]:

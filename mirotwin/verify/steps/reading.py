@@ -16,9 +16,10 @@ import msgspec
 
 from miro_exact.plugins import use_one_of
 from miro_sim.scenario.errors import ScenarioError, choices_of, remedy_for_key, value_error
+from miro_sim.scenario.file import ScenarioText
 from miro_sim.scenario.keys import Scenario
 from miro_sim.world.conditions import CONDITIONS, Condition, WheelSpeeds
-from mirotwin.verify.checks.expect import checks_of_table, expectations_of
+from mirotwin.verify.checks.expect import checks_of_table
 from mirotwin.verify.checks.interface import in_ms, ms_ticks
 from mirotwin.verify.steps.keys import LOOKING, PLAIN, SENDS, VERBS, CheckStep, SaveStep, SilenceStep, Step
 
@@ -34,10 +35,12 @@ def steps_of(scenario: Scenario, origin: str) -> list[Step]:
     return steps
 
 
-def everything(scenario: Scenario, origin: str) -> None:
-    """What a scenario says to checks and in steps: raises ScenarioError for what cannot be meant."""
-    expectations_of(scenario, origin)
-    steps_of(scenario, origin)
+def steps_in(text: ScenarioText) -> list[Step]:
+    """Those of a scenario that was read; an error names the setting that it concerns."""
+    try:
+        return steps_of(text.scenario, text.origin)
+    except ScenarioError as error:
+        raise text.blamed(error) from error.__cause__
 
 
 def check_order(steps: Sequence[Step], scenario: Scenario, origin: str) -> None:

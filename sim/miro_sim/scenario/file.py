@@ -5,7 +5,7 @@ Nothing but `ScenarioError` leaves these functions, whatever the text.
 
 import os
 import re
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
 
@@ -25,15 +25,14 @@ from miro_sim.scenario.variants import with_variant
 _BUILTIN = Path(__file__).parent / "builtin"
 LONGEST_S = 86_400.0
 """The longest duration that a scenario may have: a day."""
-Also = Callable[[Scenario, str], object] | None
-"""Another check of a scenario, whose origin is the second argument: raises ScenarioError."""
 
 
 class ScenarioText(msgspec.Struct, frozen=True):
     """A scenario together with its text, which a recording keeps: as it was read, or as the `settings` left it.
 
     The text of one that names another (`base`) is that of the whole. `notes`: what the settings left out, a line each.
-    `source`: the text as it was read; `tables`: what became of it, None where that is the same.
+    `source`: the text as it was read; `tables`: what became of it, None where that is the same. `made`: the settings
+    of the file and then `settings`.
     """
 
     origin: str
@@ -42,10 +41,15 @@ class ScenarioText(msgspec.Struct, frozen=True):
     settings: tuple[str, ...] = ()
     notes: tuple[str, ...] = ()
     tables: dict[str, Any] | None = None
+    made: tuple[Setting, ...] = ()
 
     @property
     def text(self) -> str:
         return self.source if self.tables is None else written(self.tables, self.origin, self.settings)
+
+    def blamed(self, error: ScenarioError) -> ScenarioError:
+        """The same error in what somebody else reads in the scenario, naming the setting that it concerns."""
+        return blamed(error, self.made, self.tables or {})
 
 
 def builtin_names() -> list[str]:
@@ -69,20 +73,20 @@ def builtin_text(name: str) -> str:
     return (_BUILTIN / f"{name}.toml").read_text(encoding="utf-8")
 
 
-def load(source: str, settings: Sequence[str] = (), also: Also = None) -> ScenarioText:
+def load(source: str, settings: Sequence[str] = ()) -> ScenarioText:
     """The scenario that `source` names: a file if it ends in .toml or has a path separator, else a
-    built-in. `settings` and `also` as `parse` takes them.
+    built-in. `settings` as `parse` takes them.
     """
-    return of_text(source_text(source), source, settings, also)
+    return of_text(source_text(source), source, settings)
 
 
-def of_text(text: str, origin: str, settings: Sequence[str] = (), also: Also = None) -> ScenarioText:
+def of_text(text: str, origin: str, settings: Sequence[str] = ()) -> ScenarioText:
     """As `load`, of a text that `origin` names."""
     raw = _tables(text, origin)
     whole, own = with_base(raw, origin, lambda source: _tables(source_text(source), source))
-    scenario, notes = _checked(whole, origin, settings, also, own)
+    made = _checked(whole, origin, settings, own)
     same = whole is raw and not settings
-    return ScenarioText(origin, text, scenario, tuple(settings), notes, None if same else whole)
+    return msgspec.structs.replace(made, source=text, tables=None if same else whole)
 
 
 def source_text(source: str) -> str:
@@ -114,23 +118,20 @@ def decode(raw: bytes, origin: str) -> str:
         raise ScenarioError(origin, f"line {line}", "not UTF-8 text", "save the file as UTF-8") from None
 
 
-def parse(text: str, origin: str, settings: Sequence[str] = (), also: Also = None) -> Scenario:
+def parse(text: str, origin: str, settings: Sequence[str] = ()) -> Scenario:
     """TOML text to a Scenario, after the `settings` (`KEY=VALUE`, see `settings`) were made in it.
-
-    `also` checks what this package does not know: what `mirotwin.verify.checks` makes of `[expect]`.
 
     Raises ScenarioError (and nothing else) naming `origin` and the place. A text that stands in no file (`origin` "")
     may name no other one.
     Decides the engine, if nothing has yet: where a reference leads is computed by a hot module.
     """
-    return of_text(text, origin, settings, also).scenario
+    return of_text(text, origin, settings).scenario
 
 
-def changed(scenario: Scenario, origin: str, settings: Sequence[str], also: Also = None) -> Scenario:
+def changed(scenario: Scenario, origin: str, settings: Sequence[str]) -> ScenarioText:
     """A scenario that stands in no file, with these settings. Raises ScenarioError."""
-    if not settings:
-        return scenario
-    return of_table(without_none(msgspec.to_builtins(scenario)), origin, settings, also)
+    raw = without_none(msgspec.to_builtins(scenario))
+    return _checked(raw, origin, settings) if settings else ScenarioText(origin, "", scenario, tables=raw)
 
 
 def _tables(text: str, origin: str) -> dict[str, Any]:
@@ -138,14 +139,14 @@ def _tables(text: str, origin: str) -> dict[str, Any]:
         return tables(text)
 
 
-def of_table(raw: dict[str, Any], origin: str, settings: Sequence[str] = (), also: Also = None) -> Scenario:
+def of_table(raw: dict[str, Any], origin: str) -> Scenario:
     """A Scenario from the tables that TOML text gave, which may be filled in. Raises ScenarioError as `parse` does."""
-    return _checked(raw, origin, settings, also)[0]
+    return _checked(raw, origin).scenario
 
 
 def _checked(
-    raw: dict[str, Any], origin: str, settings: Sequence[str], also: Also, own: Sequence[Setting] = ()
-) -> tuple[Scenario, tuple[str, ...]]:
+    raw: dict[str, Any], origin: str, settings: Sequence[str] = (), own: Sequence[Setting] = ()
+) -> ScenarioText:
     """The scenario of these tables; makes the settings in them. `own`: those that its file has made.
 
     A setting that chooses another kind of something leaves the old kind's keys out; a note for each says which.
@@ -154,9 +155,9 @@ def _checked(
     dropped: dict[str, list[str]] = {}
     while True:
         try:
-            scenario = _converted(raw, origin, also)
-            notes = (f"{path} leaves out {', '.join(keys)}" for path, keys in dropped.items())
-            return scenario, tuple(notes)
+            scenario = _converted(raw, origin)
+            notes = tuple(f"{path} leaves out {', '.join(keys)}" for path, keys in dropped.items())
+            return ScenarioText(origin, "", scenario, tuple(settings), notes, raw, tuple(made))
         except ScenarioError as error:
             found = drop_other_kind(error, made)
             if found is None:
@@ -166,7 +167,7 @@ def _checked(
             raise ScenarioError(origin, "", "nested too deeply", "tables have at most 5 levels") from None
 
 
-def _converted(raw: dict[str, Any], origin: str, also: Also) -> Scenario:
+def _converted(raw: dict[str, Any], origin: str) -> Scenario:
     """The scenario of complete tables. Raises ScenarioError."""
     from miro_sim.scenario.build import check_robots  # needs hot modules: not before the engine was chosen
 
@@ -180,8 +181,6 @@ def _converted(raw: dict[str, Any], origin: str, also: Also) -> Scenario:
     except msgspec.ValidationError as error:
         raise value_error(origin, complete, full_message(error)) from cause_of(error)
     check_robots(scenario, origin)
-    if also is not None:
-        also(scenario, origin)
     return scenario
 
 
@@ -199,7 +198,7 @@ def _with_profiles(raw: dict[str, Any], origin: str) -> dict[str, Any]:
     return {**raw, "network": complete}
 
 
-def live_scenario(source: str, settings: Sequence[str] = (), also: Also = None) -> ScenarioText:
+def live_scenario(source: str, settings: Sequence[str] = ()) -> ScenarioText:
     """The scenario that `source` names, with `settings` and then those of a live session made in it.
 
     Its hosts send nothing, because a program at a port does; it lasts a day at most. References that would leave the
@@ -207,13 +206,22 @@ def live_scenario(source: str, settings: Sequence[str] = (), also: Also = None) 
     summary compares with. Raises ScenarioError as `load` does, also for a reference of one's own that leaves the pitch
     within a day, and for a scenario with steps.
     """
+    return lasting(for_session(source, settings))
+
+
+def for_session(source: str, settings: Sequence[str] = ()) -> ScenarioText:
+    """The scenario of a live session before it is made to last: what it expects is right for its own duration."""
     if source in builtin_names():
         settings = ("expect={}", *settings)  # which its own controller is to fulfil, and nothing steers here
-    own = load(source, settings, also)
+    return load(source, settings)
+
+
+def lasting(own: ScenarioText) -> ScenarioText:
+    """That of `for_session` as `live_scenario` makes it."""
     if own.scenario.step:
         what = "a live session does no steps"
-        raise ScenarioError(source, "step", what, "run them by `mirotwin test`, or remove them")
-    return load(source, (*settings, *live_settings(own.scenario)), also)
+        raise ScenarioError(own.origin, "step", what, "run them by `mirotwin test`, or remove them")
+    return load(own.origin, (*own.settings, *live_settings(own.scenario)))
 
 
 def live_settings(scenario: Scenario) -> list[str]:

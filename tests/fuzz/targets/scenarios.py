@@ -9,13 +9,14 @@ from miro_exact.domain import DomainError
 from miro_robot.firmware import image_path
 from miro_robot.image import load_hex
 from miro_sim.scenario.errors import ScenarioError
-from miro_sim.scenario.file import decode, of_table, parse
+from miro_sim.scenario.file import decode, of_table, of_text, parse
 from miro_sim.scenario.keys import without_expectations
 from miro_sim.world.world import World
 from mirotwin.ports.url import parse_url
 from mirotwin.runs.job import load_job
 from mirotwin.verify.cases.case import tables_of
-from mirotwin.verify.steps.reading import everything
+from mirotwin.verify.checks.expect import expectations_in
+from mirotwin.verify.steps.reading import steps_in
 from tests.fuzz.target import Target, always, folder, refused
 from tests.fuzz.targets.captures import STREAM_WORDS
 from tests.mirotwin.conftest import SHORT
@@ -23,9 +24,17 @@ from tests.mirotwin.conftest import SHORT
 _ORIGIN = "fuzz.toml"
 
 
+def _read(text, settings):
+    """The scenario with what it expects and its steps, as `run` reads it."""
+    found = of_text(text, _ORIGIN, settings)
+    expectations_in(found)
+    steps_in(found)
+    return found.scenario
+
+
 def _scenario(data):
     try:
-        found = parse(decode(data, _ORIGIN), _ORIGIN, (), everything)
+        found = _read(decode(data, _ORIGIN), ())
     except ScenarioError as error:
         return refused(error)
     tables = tables_of(found)
@@ -39,10 +48,10 @@ def _scenario(data):
 def _settings(data):
     settings = data.decode("utf-8", "surrogateescape").split("\n")
     try:
-        found = parse(SHORT, _ORIGIN, settings[:8], everything)
+        found = _read(SHORT, settings[:8])
     except ScenarioError as error:
         return refused(error)
-    assert parse(SHORT, _ORIGIN, settings[:8], everything) == found
+    assert _read(SHORT, settings[:8]) == found
     return "taken"
 
 

@@ -18,7 +18,7 @@ from mirotwin.runs.job import load_job
 from mirotwin.runs.run import Run
 from mirotwin.runs.spec import RunSpec, silent_scenario
 from mirotwin.shell.verdicts import VERDICTS
-from mirotwin.verify.steps.reading import steps_of
+from mirotwin.verify.steps.reading import steps_in
 from tests.mirotwin.conform.images import FAULTS, image_of
 from tests.mirotwin.verify.checks.rig import own_image
 
@@ -49,7 +49,7 @@ def test_a_spec_gives_the_same_bits_stepped_played_and_recorded():
 
 def test_a_run_says_steps_checks_and_faults_in_this_order_and_lists_faults_first():
     text = of_text(TEXT, "mine")
-    run = Run(RunSpec.of(text, image_of(FAULTS), steps=steps_of(text.scenario, "mine")))
+    run = Run(msgspec.structs.replace(RunSpec.of(text, image_of(FAULTS)), steps=steps_in(text)))
     run.drive()
     run.finish()
     result = run.result()

@@ -9,7 +9,6 @@ from miro_robot.firmware import image_path
 from miro_robot.image import load_hex
 from miro_sim.scenario.file import parse
 from miro_sim.world.world import World
-from mirotwin.verify.checks.expect import expectations_of
 from mirotwin.verify.checks.monitors import Checks
 from tests.mutants.build import build
 from tests.mutants.draw import SOURCE, source_files
@@ -43,7 +42,7 @@ def own_image():
 def silent_world(expect, image=None, squelch=True, stop=True):
     """One robot in slot 1 of 3 whose host sends nothing, and its checks (lines of `[expect]`)."""
     flags = {"squelch": str(squelch).lower(), "stop": str(stop).lower()}
-    scenario = parse(SILENT.format(expect=expect, **flags), "silent", (), expectations_of)
+    scenario = parse(SILENT.format(expect=expect, **flags), "silent")
     world = World(scenario, 3, image or own_image())
     return world, Checks(world)
 

@@ -7,7 +7,7 @@ import pytest
 
 from miro_sim.scenario.errors import ScenarioError
 from miro_sim.scenario.file import load, parse
-from mirotwin.verify.checks.expect import ALWAYS_ON, expectations_of, says_anything
+from mirotwin.verify.checks.expect import ALWAYS_ON, expectations_in, expectations_of, says_anything
 from tests.mirotwin.verify.checks.rig import needs_sdcc, planted
 from tests.mirotwin.verify.checks.test_planted import ALWAYS
 
@@ -108,11 +108,11 @@ def test_the_path_of_one_robots_expectation_is_its_own():
 
 def test_a_setting_is_named_as_it_was_given():
     with pytest.raises(ScenarioError, match=r"fig6: --expect inside_pitch=3: expected true or false, got 3"):
-        load("fig6", ["expect.inside_pitch=3"], expectations_of)
+        expectations_in(load("fig6", ["expect.inside_pitch=3"]))
     with pytest.raises(
         ScenarioError, match=r"fig6: --set network.robot.expect.inside_pitch=3: expected true or"
     ):
-        load("fig6", ["network.robot.expect.inside_pitch=3"], expectations_of)
+        expectations_in(load("fig6", ["network.robot.expect.inside_pitch=3"]))
 
 
 # In run and replay: lines on stderr, exit codes, the summary

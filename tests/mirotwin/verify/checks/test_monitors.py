@@ -8,7 +8,6 @@ from miro_robot.event_log import RECEIVED
 from miro_sim.scenario.file import load, parse
 from miro_sim.world import conditions
 from miro_sim.world.world import World
-from mirotwin.verify.checks.expect import expectations_of
 from mirotwin.verify.checks.interface import Check, Monitor
 from mirotwin.verify.checks.monitors import Checks, ExpectationFailed
 from tests.mirotwin.conform.images import BABBLES, HANGS, image_of
@@ -36,7 +35,7 @@ robot = [{{ slot = 4, reference.kind = "line", start_error_x_cm = 3.0 }}]
 
 
 def judged(seed, advance, text=TWO):
-    scenario = parse(text, "two", (), expectations_of)
+    scenario = parse(text, "two")
     world = World(scenario, seed, own_image())
     checks = Checks(world)
     while not world.finished:
@@ -80,7 +79,7 @@ def test_periods_that_are_told_together_are_judged_as_one_by_one(image, profile)
     """Who asks for failures is told of all periods so far."""
 
     def found(asking):
-        world = World(parse(LATER.format(profile=profile), "later", (), expectations_of), 2, image)
+        world = World(parse(LATER.format(profile=profile), "later"), 2, image)
         checks = Checks(world)
         draw = random.Random(5)
         seen = []
@@ -213,7 +212,7 @@ def test_a_robot_that_is_reset_owes_nothing_from_before():
 
 
 def test_a_reset_pin_that_stays_down_excuses_no_other_robot():
-    scenario = parse(TWO, "two", ["expect.failsafe_stop_ms=true"], expectations_of)
+    scenario = parse(TWO, "two", ["expect.failsafe_stop_ms=true"])
     world = World(scenario, 1, own_image())
     checks = Checks(world)
     world.run_to(world.set_reset(1, 0, 2))

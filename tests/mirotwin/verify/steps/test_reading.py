@@ -7,9 +7,9 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from miro_sim.scenario.errors import ScenarioError
-from miro_sim.scenario.file import parse
+from miro_sim.scenario.file import load, parse
 from miro_sim.world.conditions import CONDITIONS, Command, WheelSpeeds
-from mirotwin.verify.checks.expect import CHECKS, struct_of
+from mirotwin.verify.checks.expect import CHECKS, expectations_of, struct_of
 from mirotwin.verify.steps.keys import (
     PLAIN,
     SENDS,
@@ -22,7 +22,7 @@ from mirotwin.verify.steps.keys import (
     acceleration_units,
 )
 from mirotwin.verify.steps.player import check_symbols
-from mirotwin.verify.steps.reading import everything, steps_of
+from mirotwin.verify.steps.reading import steps_in, steps_of
 from tests.mirotwin.verify.steps.rig import ORIGIN, own_image, read, scenario_of
 
 WRONG = {
@@ -162,14 +162,20 @@ EXPECT = st.dictionaries(st.sampled_from([*CHECKS.own, "a b", ""]), VALUES, max_
 @given(STEPS, EXPECT)
 def test_any_table_of_steps_and_of_checks_is_read_or_refused_with_its_place(tables, expect):
     scenario = scenario_of("")
-    for key, value, begin in (("step", tuple(tables), "step "), ("expect", expect, "expect.")):
+    ways = ("step", tuple(tables), "step ", steps_of), ("expect", expect, "expect.", expectations_of)
+    for key, value, begin, reader in ways:
         said = ""
         try:
-            everything(msgspec.structs.replace(scenario, **{key: value}), ORIGIN)
+            reader(msgspec.structs.replace(scenario, **{key: value}), ORIGIN)
         except ScenarioError as error:
             said = str(error)
         assert not said or said.startswith(f"{ORIGIN}: {begin}")
         assert "\n" not in said
+
+
+def test_a_setting_that_makes_a_step_wrong_is_named():
+    with pytest.raises(ScenarioError, match=r"silent with --set step=\[{pauze_ms=1}\]: step 1: does nothing"):
+        steps_in(load("silent", ["step=[{pauze_ms=1}]"]))
 
 
 SMALL = st.floats(0.001, 9.0).map(lambda value: round(value, 3))
