@@ -19,9 +19,9 @@ FEWEST_FOR_GATE = 20
 """Seeds below which a comparison fails or passes by the luck of a few."""
 COUNTED = ("error", "fault")
 SHOWN = ("rms_position_cm", "rms_theta_deg", "settling_s")
-"""What is shown unless told."""
+"""Metrics that are shown unless others are requested."""
 GATED = (*SHOWN, "unsettled", "failed", *COUNTED)
-"""What is judged unless told. A smaller number is better in each."""
+"""Metrics that are judged unless others are requested. A smaller number is better in each."""
 MORE_IS_BETTER = ("frames_accepted", "frames_sent", "simulated_s", "vision_frames", "idle_cycles")
 
 

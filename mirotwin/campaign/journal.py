@@ -152,7 +152,7 @@ def outcomes(path: Path) -> Iterator[tuple[RunOutcome, int]]:
 
 
 def in_order(outcomes: Iterable[RunOutcome]) -> Iterator[RunOutcome]:
-    """Each run's outcome in the order of the plan; only those are kept that came before their turn."""
+    """Each run's outcome in the order of the plan; only those that came before their turn are held."""
     early: dict[int, RunOutcome] = {}
     turn = 0
     for outcome in outcomes:

@@ -122,7 +122,7 @@ def _comparisons(rows: ResultRows, made: dict[str, Any]) -> list[dict[str, Any]]
 
 
 def _failed(rows: ResultRows) -> list[tuple[int, str, int, str, str]]:
-    """Run, arm, seed, verdict and what it said, of each run that has not passed."""
+    """Run, arm, seed, verdict and its message, of each run that has not passed."""
     factors = rows.about.factors
     columns = [rows.column(name) for name in ("run", "seed", "verdict", "error", "failure")]
     levels = {name: rows.column(name) for name in factors}

@@ -19,7 +19,7 @@ from mirotwin.campaign.workers import Processes, Workers, refuse_in_import
 from mirotwin.shell.outputs import check_file, make_folder
 
 MANY_RUNS = 100_000
-"""More have to be asked for: they take most of a day."""
+"""More runs need the user's consent: they take most of a day."""
 
 
 class Tally(msgspec.Struct):

@@ -43,7 +43,7 @@ _REASONS = {
     "only a twin has such LM629s, or such pins": "P57 P58 P59 P60",
 }
 NOT_OBSERVABLE = {id: why for why, ids in _REASONS.items() for id in ids.split()}
-"""Why a rule cannot be seen at a port."""
+"""Why a rule cannot be observed at a port."""
 SHORTEST_US = 5000.0
 """A pause that a PC can make within a frame."""
 SURE_TICKS = 5 * TICKS_PER_MS
@@ -73,10 +73,10 @@ class PortScript(TrialScript):
 
     def say(self, kind: int, payload: bytes, what: str, words: Pairs = (), **how: Unpack[How]) -> Frame:
         """Sends a frame that a PC can send; lets the frame's time pass without it otherwise."""
-        before = len(self.said)
+        before = len(self.sent)
         frame = super().say(kind, payload, what, words, **how)
         if "bad_stop" in how or any(pause < SHORTEST_US for pause in how.get("pauses", {}).values()):
-            del self.said[before:]
+            del self.sent[before:]
         elif how.get("fresh", True):
             self.fresh += 1
         elif how.get("step", 1) == 1:
@@ -131,12 +131,12 @@ def _try(rule: Rule, port: RobotPort, topology: Topology) -> tuple[Failure | Non
 
     @script.expects(last.end_tick, f"{amount(fresh, 'frame')} accepted by {last.what}", by_answers=True)
     def counted(observed: Observed) -> Found:
-        said = [one.said for one in observed.answers if one.frame.seq == last.seq and one.said is not None]
-        found = f"{said[-1].accepted}" if said else "no answer"
+        answers = [one.content for one in observed.answers if one.frame.seq == last.seq and one.content]
+        found = f"{answers[-1].accepted}" if answers else "no answer"
         if found != f"{fresh}":
             yield observed.end_tick, found
 
-    sent = _whole(script.said)
+    sent = _whole(script.sent)
     port.greet((script.n,), sent)
     # from here on: what greeting took says nothing of the trial
     cursor, begun = Cursor(port.log), len(port.late_ticks)
@@ -158,7 +158,7 @@ def _try(rule: Rule, port: RobotPort, topology: Topology) -> tuple[Failure | Non
     gather(port.tick)
     unsure = max(*port.late_ticks[begun:], max(port.delays) - shortest)
 
-    for one in script.expected:  # what power-on did is told by now
+    for one in script.expected:  # the effects of power-on are reported by now
         if one.by_answers and slot in one.slots and "of power-on" not in one.wanted:
             if (what := one.found(observed)) is not None:
                 return Failure("conforms_to", 0, slot, what[0], one.wanted, what[1]), unsure

@@ -87,7 +87,7 @@ def hidden_by(outcomes: Sequence[Outcome]) -> dict[str, list[str]]:
 
 
 def causes_first(outcomes: Sequence[Outcome], causes: Sequence[str]) -> list[Outcome]:
-    """Failed rules that hide others, then other failed ones, those not judged, those that are kept, and the rest."""
+    """Failed rules that hide others, then other failed ones, those not judged, those that passed, and the rest."""
     verdicts = ("failed", "not judged", "passed", "not observable")
     places = {id: place for place, id in enumerate(causes)}
     return sorted(outcomes, key=lambda one: (verdicts.index(one.verdict), places.get(one.rule, len(places))))
@@ -167,15 +167,15 @@ def conform(options: ConformOptions) -> int:
                 bar.to(len(outcomes))
                 if artifacts is not None and not unwritten:
                     unwritten = _keep(outcome, artifacts, firmware)
-        except BadInput as error:  # a robot that was lost: what was found before is told
+        except BadInput as error:  # a robot that was lost: outcomes before that are reported
             lost = error
     outcomes = with_faults(outcomes, rules)
     if outcomes or lost is None:
-        _tell(outcomes, rules, options)
+        _report(outcomes, rules, options)
     if unwritten:
         complain(unwritten)
     _report_faults(outcomes)
-    if options.junit is not None and (outcomes or lost is None):  # told first, whatever becomes of the file
+    if options.junit is not None and (outcomes or lost is None):  # reported first: the file may fail
         cases = [_test_case(one, bool(options.ids)) for one in outcomes]
         with whole_file(options.junit, "--junit") as part:
             part.write_bytes(junit_xml("mirotwin conform", cases, properties))
@@ -191,7 +191,7 @@ def _counting(outcome: Outcome, named: bool) -> Verdict:
 
 
 def _keep(outcome: Outcome, artifacts: Path, firmware: Image) -> str:
-    """Leaves the cases of a rule; "" or why it cannot, for when all verdicts are told."""
+    """Leaves the cases of a rule; "" or why it cannot, for when all verdicts are reported."""
     try:
         for name, text in outcome.cases:
             write_case(artifacts / name, text)
@@ -201,7 +201,7 @@ def _keep(outcome: Outcome, artifacts: Path, firmware: Image) -> str:
     return ""
 
 
-def _tell(outcomes: Sequence[Outcome], rules: Sequence[Rule], options: ConformOptions) -> None:
+def _report(outcomes: Sequence[Outcome], rules: Sequence[Rule], options: ConformOptions) -> None:
     if options.as_json:
         _print_json(outcomes)
         return
@@ -244,7 +244,7 @@ def _list(rules: Sequence[Rule], as_json: bool) -> None:
 
 
 def _test_case(outcome: Outcome, named: bool) -> TestCase:
-    """Without a time: the same image gives the same bytes. `named`: somebody asked for this rule."""
+    """Without a time: the same image gives the same bytes. `named`: the user named this rule."""
     rule = find(outcome.rule)
     case = TestCase(f"{rule.id} {rule.name}", f"conform.{chapter_of(rule).title}")
     cause = outcome.cause and f"{outcome.cause} failed, {find(outcome.cause).broken}"

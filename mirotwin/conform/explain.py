@@ -121,7 +121,7 @@ def _characters(run: Sequence[Event]) -> str:
 def _answer(run: Sequence[Event], observed: Observed) -> str:
     """What the characters say, if they are an answer."""
     for answer in within(observed.answers, run[0].tick, run[-1].tick):
-        content = answer.said
+        content = answer.content
         if content is None:
             return ": an answer with unknown contents"
         return (

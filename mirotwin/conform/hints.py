@@ -116,7 +116,7 @@ def _signed(byte: int) -> int:
 
 
 def characters(received: Sequence[Event]) -> str:
-    """Characters that the PC heard: how many, which, from when to when."""
+    """Characters that the PC received: how many, which, from when to when."""
     shown = " ".join(f"{one.value:02X}" + ("" if one.good_stop else "!") for one in received[:24])
     more = " .." if len(received) > 24 else ""
     count = amount(len(received), "character")

@@ -34,11 +34,11 @@ def within(items: Iterable[T], after_tick: int, until_tick: int) -> list[T]:
 
 
 class ReceivedAnswer(msgspec.Struct, frozen=True):
-    """A valid answer that the PC had received whole at `tick`. `said`: its content; None where that is not known."""
+    """A valid answer that the PC had received whole at `tick`. `content`: None where that is not known."""
 
     tick: int
     frame: Received
-    said: TelemetryFrame | None
+    content: TelemetryFrame | None
 
 
 class Observed:
@@ -57,7 +57,7 @@ class Observed:
         self.filters: dict[str, list[tuple[int, Words]]] = {side: [] for side in SIDES}
         self.events: list[Event] = []
         self.commands: list[Event] = []
-        self.heard: list[Event] = []
+        self.received: list[Event] = []
         self.answers: list[ReceivedAnswer] = []
         self.periods: list[tuple[int, RobotPeriod]] = []
         self.samples: list[tuple[int, int, int]] = []  # when looked at; next samples of left and right
@@ -69,7 +69,7 @@ class Observed:
         if event.what == "command":
             self._command(event)
         elif event.what == "heard":
-            self.heard.append(event)
+            self.received.append(event)
         elif event.what == "answer" and event.frame is not None:
             try:
                 content = event.frame.message(self.robots)
@@ -81,8 +81,8 @@ class Observed:
     def forget(self, data: bytes) -> None:
         """Removes the last reception of these characters: another robot sent them."""
         # the last ones: the robot under test may have sent the same characters before
-        start = bytes(event.value for event in self.heard).rfind(data)
-        del self.heard[start : start + len(data)]
+        start = bytes(event.value for event in self.received).rfind(data)
+        del self.received[start : start + len(data)]
 
     def take_period(self, tick: int, record: RobotPeriod, board: Board) -> None:
         """The robot as it was at the start of a control period, and its board as it is now."""
@@ -111,13 +111,13 @@ class Observed:
 
     # ---- requested by the rules ----------------------------------------------------------------------------
 
-    def told(self, side: str, tick: int) -> Order:
+    def last_order(self, side: str, tick: int) -> Order:
         """The last order to the wheel, up to and including `tick`."""
         return next(order for order in reversed(self.orders[side]) if order.tick <= tick)
 
-    def both_told(self, tick: int) -> tuple[Order, Order]:
+    def both_orders(self, tick: int) -> tuple[Order, Order]:
         left, right = SIDES
-        return self.told(left, tick), self.told(right, tick)
+        return self.last_order(left, tick), self.last_order(right, tick)
 
     def ordered(self, after_tick: int, until_tick: int) -> Iterator[Order]:
         """The orders to either wheel in between, in the order of time."""

@@ -58,7 +58,7 @@ def why_deaf(network: int, image: Image, seed: int) -> str:
                 tried.append((f"frames with {mistake}", script.team(sealed=sealing.seal)))
         other = _other_layout(script)
         tried.append((f"frames for {other.n} robots: its strap for N is read the other way", other.team()))
-        script.said += other.said
+        script.sent += other.sent
         script.wait_until(other.now)
         script.expects(script.now, "")(lambda observed: iter(()))
 
@@ -82,7 +82,7 @@ def _other_layout(script: TrialScript) -> TrialScript:
 
 
 def _begins_again(listener: Listener) -> str:
-    """Whether the firmware has reset LM629s that it had told to turn. The trial resets no processor."""
+    """Whether the firmware has reset LM629s that it had ordered to turn. The trial resets no processor."""
     turned_tick = min((one.tick for one in listener.observed.commands if one.opcode == _STT), default=None)
     board = listener.subject.robot.board
     if turned_tick is None or board.left.reset_tick <= turned_tick:
@@ -131,7 +131,7 @@ def why_lost(rule: Rule, network: int, image: Image, seed: int) -> str:
 def _obeyed(observed: Observed, tried: Sequence[tuple[str, Frame]]) -> str:
     for mistake, frame in tried[1:]:
         if observed.slot < len(frame.words) and all(
-            map(obeys, observed.both_told(frame.acted_tick), frame.for_robot(observed.slot))
+            map(obeys, observed.both_orders(frame.acted_tick), frame.for_robot(observed.slot))
         ):
             return f"it obeys {mistake}"
     return ""

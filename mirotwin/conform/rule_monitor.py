@@ -33,7 +33,7 @@ class ConformsTo(Check, frozen=True, kw_only=True, tag="conforms_to"):
 
     def the_rule(self) -> Rule:
         """ValueError for a rule that there is not."""
-        from mirotwin.conform.rules import find  # the rules are read when one is asked for
+        from mirotwin.conform.rules import find  # the rules are read when one is requested
 
         try:
             return find(self.rule)

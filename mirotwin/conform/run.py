@@ -191,10 +191,10 @@ def with_faults(outcomes: Sequence[Outcome], rules: Sequence[Rule]) -> list[Outc
     for rule in rules:
         if rule.id in by_id:  # else a port was lost before
             forbidden = [
-                _of_fault("conforms_to", f"no such fault (trial of {one.rule})", *told)
+                _of_fault("conforms_to", f"no such fault (trial of {one.rule})", *fault)
                 for one in outcomes
-                for told in one.faults
-                if told[2].kind in rule.faults
+                for fault in one.faults
+                if fault[2].kind in rule.faults
             ]
             outcome = by_id[rule.id]
             cause = "" if forbidden else outcome.cause

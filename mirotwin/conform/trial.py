@@ -1,4 +1,4 @@
-"""A rule's trial: the world in which it is tried, what is said in it, and what is expected.
+"""A rule's trial: the world in which it is tried, what is sent in it, and what is expected.
 
 Robots stand far apart; the radio has no errors; the camera sees nothing, because nobody steers. A trial depends on its
 rule alone: the seed changes the noise on RXD between keyed frames, and nothing else.
@@ -63,9 +63,9 @@ def trial_of(rule: Rule) -> Trial:
     scripts = [TrialScript(topology, index) for index, topology in enumerate(rule.topologies)]
     for script in scripts:
         rule.write(script)
-    items: list[ScriptItem] = [item for script in scripts for item in (*script.said, *script.done)]
+    items: list[ScriptItem] = [item for script in scripts for item in (*script.sent, *script.done)]
     end_tick = max(one.tick for script in scripts for one in script.expected)
-    # everything before the end is told, so the last expectation needs a tick more
+    # everything before the end is reported, so the last expectation needs a tick more
     periods = end_tick // CONTROL_PERIOD_TICKS + 1
     places = iter(_PLACES)
     scenario = {

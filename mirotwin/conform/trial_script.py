@@ -105,7 +105,7 @@ class TrialExpectation:
 
 
 class How(TypedDict, total=False):
-    """How a frame is said; see `TrialScript.say`."""
+    """How a frame is sent; see `TrialScript.say`."""
 
     slot: int
     step: int
@@ -123,7 +123,7 @@ class TrialScript:
     """The host of network `network`. `now`: when it can speak next; `seq`: of its last fresh frame; `slot`: of its
     first robot.
 
-    `said`, `done` and `expected` are the result.
+    `sent`, `done` and `expected` are the result.
     """
 
     def __init__(self, topology: Topology, network: int = 0) -> None:
@@ -135,7 +135,7 @@ class TrialScript:
         self.character_ticks = -(-HOST_CHARACTER_TICKS * 1_000_000 // (1_000_000 + topology.baud_offset_ppm))
         self.now = ms(BOOTED_MS)
         self.seq = 20 + network
-        self.said: list[Transmission] = []
+        self.sent: list[Transmission] = []
         self.done: list[Action] = []
         self.expected: list[TrialExpectation] = []
         self._words = 0
@@ -153,7 +153,7 @@ class TrialScript:
         self.now = tick
 
     def words(self) -> Pairs:
-        """Velocities that were not said before, different for each wheel; every robot turns on the spot, slowly."""
+        """Velocities that were not sent before, different for each wheel; every robot turns on the spot, slowly."""
         self._words += 1
         pairs = []
         for slot in range(self.n):
@@ -242,8 +242,8 @@ class TrialScript:
         return begun
 
     def characters(self, data: bytes, bad_stop: tuple[int, ...] = ()) -> None:
-        """Characters right after what was said last, if nothing was waited."""
-        self.said.append(Transmission(self.now, DOWN, data, self.network, bad_stop))
+        """Characters right after those that were sent last, if nothing was waited."""
+        self.sent.append(Transmission(self.now, DOWN, data, self.network, bad_stop))
         self.now += len(data) * self.character_ticks
 
     # ---- doing ---------------------------------------------------------------------------------------------
@@ -271,11 +271,11 @@ class TrialScript:
         return keep
 
     def obeyed(self, frame: Frame) -> Frame:
-        """Both wheels are told the frame's velocities in time. A wheel that is told 0 may also be stopped."""
+        """Both wheels receive the frame's velocities in time. A wheel that receives 0 may also be stopped."""
 
         @self.expects(frame.acted_tick, f"the wheels told as by {frame.what} within {ACTING_MS:g} ms")
         def test(observed: Observed) -> Found:
-            orders = observed.both_told(frame.acted_tick)
+            orders = observed.both_orders(frame.acted_tick)
             wanted = frame.for_robot(observed.slot)
             if not all(map(obeys, orders, wanted)):
                 left, right = map(number, wanted)
@@ -285,21 +285,21 @@ class TrialScript:
         return frame
 
     def ignored(self, frame: Frame) -> None:
-        """The wheels are told nothing new."""
+        """The wheels receive no new order."""
         self.unchanged(frame.tick, frame.acted_tick, f"{frame.what} not acted on")
 
     def unchanged(self, after_tick: int, until_tick: int, wanted: str) -> None:
-        """In between no wheel is told anything but what it was told last."""
+        """In between no wheel receives another order than its last one."""
 
         @self.expects(until_tick, wanted)
         def test(observed: Observed) -> Found:
             for order in observed.ordered(after_tick, until_tick):
-                before = observed.told(order.side, after_tick)
+                before = observed.last_order(order.side, after_tick)
                 if (order.what, order.velocity) != (before.what, before.velocity):
                     yield order.tick, f"the {order.side} wheel told {in_words(order)}"
 
     def untouched(self, frame: Frame, slots: tuple[int, ...] = (), since: Frame | None = None) -> None:
-        """The chips are told nothing at all, only read. `since`: the failsafe must not count from that frame."""
+        """The chips receive only commands that read. `since`: the failsafe must not count from that frame."""
 
         @self.expects(frame.acted_tick, f"{frame.what} not acted on", slots)
         def test(observed: Observed) -> Found:
@@ -316,7 +316,7 @@ class TrialScript:
         @self.expects(deadline, wanted or f"an answer to {question.what}", (slot,), by_answers=True)
         def test(observed: Observed) -> Found:
             answers = within(observed.answers, question.last_tick, deadline)
-            content = answers[0].said if answers else None
+            content = answers[0].content if answers else None
             if not answers:
                 yield deadline, _no_answer(observed, question, deadline)
             elif content is None or (content.slot, content.seq) != (slot, question.seq):
@@ -325,11 +325,11 @@ class TrialScript:
                 yield answers[0].tick, reason
 
     def silent(self, after_tick: int, until_tick: int, why: str) -> None:
-        """The PC hears nothing in between."""
+        """The PC receives nothing in between."""
 
         @self.expects(until_tick, f"silence: {why}", by_answers=True)
         def test(observed: Observed) -> Found:
-            if received := in_a_row(within(observed.heard, after_tick, until_tick)):
+            if received := in_a_row(within(observed.received, after_tick, until_tick)):
                 answers = within(observed.answers, received[0].tick, received[-1].tick)
                 yield received[0].tick, ": ".join([characters(received), *map(who, answers[:1])])
 
@@ -337,7 +337,7 @@ class TrialScript:
 def _instead(observed: Observed, frame: Frame, orders: tuple[Order, Order]) -> str:
     """What the robot made of the frame, where that is plain; else ""."""
     if max(order.tick for order in orders) <= frame.tick:
-        late = _told_late(observed, frame)
+        late = _obeyed_late(observed, frame)
         if late is not None:
             return f": told so {(late - frame.end_tick) / TICKS_PER_MS:.2f} ms after its end"
         wrote = observed.wrote(frame.tick, frame.acted_tick)
@@ -347,17 +347,17 @@ def _instead(observed: Observed, frame: Frame, orders: tuple[Order, Order]) -> s
     return f": {mistake}" if mistake else ""
 
 
-def _told_late(observed: Observed, frame: Frame) -> int | None:
+def _obeyed_late(observed: Observed, frame: Frame) -> int | None:
     wanted = frame.for_robot(observed.slot)
     for order in observed.ordered(frame.acted_tick, frame.acted_tick + CONTROL_PERIOD_TICKS):
-        if all(map(obeys, observed.both_told(order.tick), wanted)):
+        if all(map(obeys, observed.both_orders(order.tick), wanted)):
             return order.tick
     return None
 
 
 def who(answer: ReceivedAnswer) -> str:
-    """Who says it, for people."""
-    content = answer.said
+    """The sender of an answer, for people."""
+    content = answer.content
     return (
         "unknown contents"
         if content is None
@@ -366,7 +366,7 @@ def who(answer: ReceivedAnswer) -> str:
 
 
 def _no_answer(observed: Observed, question: Frame, deadline: int) -> str:
-    received = within(observed.heard, question.last_tick, deadline)
+    received = within(observed.received, question.last_tick, deadline)
     later = within(observed.answers, deadline, observed.end_tick)
     late = next((one for one in later if one.frame.seq == question.seq), None)
     if late is not None and late.frame.start_tick < deadline + CONTROL_PERIOD_TICKS:

@@ -24,7 +24,7 @@ from miro_robot.image import SPACE_BYTES, Image
 from miro_sim.scenario.board import BoardScenario
 from miro_sim.world.events import Event
 from mirotwin.fuzz.processor import BOOT_MS, Processor, bit_ticks_of
-from mirotwin.fuzz.protocols import asked, protocol_named, shown
+from mirotwin.fuzz.protocols import called, protocol_named, shown
 from mirotwin.fuzz.spec import TargetSpec
 from mirotwin.fuzz.target import NEVER_SLEEPS, Target, TargetFailure, described
 from mirotwin.shell.firmware_image import load_firmware
@@ -92,7 +92,7 @@ class BoardTarget(Target):
         protocol = self.protocol
         if protocol is None:
             return body
-        return asked(protocol.repair, lambda: bytes(memoryview(protocol.repair(body, number))))
+        return called(protocol.repair, lambda: bytes(memoryview(protocol.repair(body, number))))
 
     def run(self, data: Any) -> int:
         ended = self.play(data)
@@ -175,7 +175,7 @@ class BoardTarget(Target):
         protocol = self.protocol
         if protocol is None or not isinstance(item, Transmission):
             return described(item)
-        parts = asked(protocol.decode, lambda: [shown(part) for part in protocol.decode(item.data)])
+        parts = called(protocol.decode, lambda: [shown(part) for part in protocol.decode(item.data)])
         return f"{described(item)}  # {'; '.join(parts)}"
 
     def seeds(self) -> list[bytes]:
@@ -183,7 +183,7 @@ class BoardTarget(Target):
         protocol = self.protocol
         samples: tuple[bytes, ...] = (b"\0", b"A", bytes(range(8)))
         if protocol is not None:
-            samples = asked(
+            samples = called(
                 protocol.samples, lambda: tuple(bytes(memoryview(body)) for body in protocol.samples())
             )
         if self.input == "bytes":

@@ -2,7 +2,7 @@
 
 This is one of the few places that know the wall clock.
 
-    engine ──crashes──► triage: minimised, told apart, confirmed
+    engine ──crashes──► triage: minimised, grouped, confirmed
        └────queue────► coverage, --covering, checks in Python (a share of the time, the rest waits)
 
 The engine works in processes of its own, so it goes on while one of its inputs is looked at.
@@ -70,7 +70,7 @@ class Campaign:
         self._crashes: deque[bytes] = deque()
         self._queue: deque[bytes] = deque()
         self._to_judge: deque[bytes] = deque()
-        self._seen: set[bytes] = set()
+        self._judged: set[bytes] = set()
         self._judging_s = 0.0
         self._looked = LOOKED
         self._began_s = time.monotonic()
@@ -115,14 +115,14 @@ class Campaign:
         return (self._stopped_s or time.monotonic()) - self._began_s
 
     def progress(self) -> EngineProgress:
-        """How far the engine is; of one that has ended with an error, how far it was when last asked."""
+        """How far the engine is; of one that has ended with an error, how far it was at the last look."""
         with suppress(BadInput):
             self._progress = self.engine.progress()
         return self._progress
 
     @property
     def rate(self) -> float:
-        """Executions a second of wall time, as last asked."""
+        """Executions a second of wall time, at the last look."""
         return self._progress.executions / self.run_s if self.run_s else 0.0
 
     def _show_sometimes(self) -> None:
@@ -141,8 +141,8 @@ class Campaign:
                     self._add(path.read_bytes(), inputs)
 
     def _add(self, data: bytes, inputs: deque[bytes]) -> None:
-        if data not in self._seen:
-            self._seen.add(data)
+        if data not in self._judged:
+            self._judged.add(data)
             inputs.append(data)
 
     def _work(self, end_s: float, at_ease: bool = False) -> None:

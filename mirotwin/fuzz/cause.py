@@ -1,4 +1,4 @@
-"""Where a run that ended in a fault went wrong: the instruction behind the fault, by which crashes are told apart.
+"""Where a run that ended in a fault went wrong: the instruction behind the fault, which tells crashes apart.
 
 One overflow overwrites return addresses with what the input holds, so the same mistake ends in faults all over the
 image. What they have in common is the instruction that wrote over the stack:
@@ -31,7 +31,7 @@ class Cause(msgspec.Struct, frozen=True):
 
 
 class CauseWatcher(Watcher):
-    """`cause`: the first instruction that went wrong, None where none was seen to."""
+    """`cause`: the first instruction that went wrong, None where none was observed."""
 
     def __init__(self, image: Image, names: SymbolNames) -> None:
         self._unwinder = Unwinder(image, names)

@@ -83,7 +83,7 @@ def _inputs_in(path: Path, kind: str, robots: int) -> list[bytes]:
         format, _ = detect(given.peek())
         if format in TIMED:
             by_network: dict[int, list[ScriptItem]] = {}
-            for item in _heard(given, format):
+            for item in _script(given, format):
                 by_network.setdefault(item.network, []).append(item)
             return [data for sent in by_network.values() for data in inputs_of(kind, sent, robots)]
     if path.suffix.lower() in FOREIGN or not 0 < path.stat().st_size <= INPUT_BYTES:
@@ -91,7 +91,7 @@ def _inputs_in(path: Path, kind: str, robots: int) -> list[bytes]:
     return [path.read_bytes()]
 
 
-def _heard(given: Input, format: str) -> Iterator[ScriptItem]:
-    if format == "stream":  # may say what is done to robots, too
+def _script(given: Input, format: str) -> Iterator[ScriptItem]:
+    if format == "stream":  # may hold what is done to robots, too
         return iter(stream.decode(given.read(TEXT_BYTES), given.label).script())
     return iter(open_source(given, format, lambda text: None).sent)

@@ -20,7 +20,7 @@ if TYPE_CHECKING:
     from mirotwin.fuzz.target import Target
 
 PATIENCE_S = 10.0
-"""Time for a job to write its last files once it is told to end."""
+"""Time for a job to write its last files once it is ordered to end."""
 LOG_BYTES = 1 << 20
 """A log is emptied when it is longer: afl-fuzz writes a line for each input that it takes up."""
 LONGEST_BYTES = 1024
@@ -86,7 +86,7 @@ class Explorer:
     ) -> None:
         self.target = target
         self.keep = keep
-        self.seen = 0
+        self.covered = 0
         self.failures: dict[tuple[str, int], None] = {}
         self._edges = bytearray(target.map_size)
         self._none = bytes(target.map_size)
@@ -102,15 +102,15 @@ class Explorer:
             if (failure.check, failure.pc) not in self.failures:
                 self.failures[failure.check, failure.pc] = None
                 self.keep("crashes", data)
-        elif classes & ~self.seen:
-            self.seen |= classes
+        elif classes & ~self.covered:
+            self.covered |= classes
             self.keep("queue", data)
         return len(self._edges) - self._edges.count(0)
 
     @property
     def edges(self) -> int:
         """Seen, in runs without a failure."""
-        counts = self.seen.to_bytes(len(self._edges), "little")
+        counts = self.covered.to_bytes(len(self._edges), "little")
         return len(counts) - counts.count(0)
 
 
@@ -238,7 +238,7 @@ class Engine:
         job.process.kill()
 
     def _why_ended(self, job: Job) -> BadInput:
-        """What is to be told of a job that has ended with an error."""
+        """The error to report of a job that has ended with one."""
         raise NotImplementedError
 
     def __enter__(self) -> Self:

@@ -274,7 +274,7 @@ def _run(campaign: Campaign, time_s: float, quiet: bool, in_files: Mapping[str, 
         except PluginError as error:
             stopped = BadInput("", "--expect", f"{error.what}; the campaign has ended", error.remedy)
             stopped.__cause__ = error
-        except BadInput as error:  # of the engine: what was found until then is told first
+        except BadInput as error:  # of the engine: earlier results are reported first
             stopped = error
             with suppress(BadInput, PluginError):
                 left = campaign.finish(INTERRUPTED_S)
@@ -321,11 +321,11 @@ class FuzzProgress(ProgressBar):
         """Draws the line again, or writes one if the last is some time ago."""
         run_s = campaign.run_s
         if self._shown:
-            self.to(min(run_s, self._time_s), said=said(campaign))
+            self.to(min(run_s, self._time_s), said=progress_text(campaign))
         elif not self._quiet and time.monotonic() - self._line_s >= LINE_S:
             self._line_s = time.monotonic()
             left = clock(max(0.0, self._time_s - run_s))
-            complain(f"{self.what}: {clock(run_s)}: {said(campaign)}, {left} left")
+            complain(f"{self.what}: {clock(run_s)}: {progress_text(campaign)}, {left} left")
 
     def _columns(self) -> list[ProgressColumn]:
         from rich.progress import BarColumn, TextColumn, TimeRemainingColumn
@@ -334,11 +334,11 @@ class FuzzProgress(ProgressBar):
         return [*words, BarColumn(bar_width=16), TimeRemainingColumn()]
 
 
-def said(campaign: Campaign) -> str:
+def progress_text(campaign: Campaign) -> str:
     """Rates and counts of a campaign, in short."""
     edges, triage = campaign.progress().edges, campaign.triage
     parts = [f"{campaign.rate:.0f}/s"]
-    if edges is not None:  # else the engine has not said yet
+    if edges is not None:  # else the engine has not reported yet
         parts.append(amount(edges, "edge"))
     parts.append(amount(len(triage.confirmed) or "no", "crash", "crashes"))
     if triage.unconfirmed:
@@ -368,7 +368,7 @@ def _covering(symbol: str | None, image: Image) -> Covering | None:
 
 
 def _check_at_rest(target: Target, image: Image, crystal_hz: int) -> None:
-    """Raises BadInput for firmware in which something is wrong before it has heard anything."""
+    """Raises BadInput for firmware in which something is wrong before it has received anything."""
     target.run(b"")
     failure = target.failure
     if not target.harness.sleeps and target.harness.after_ticks < 0:

@@ -108,7 +108,7 @@ def main(arguments: Sequence[str]) -> int:
         print(error, file=sys.stderr)
         return 2
     counts: Counter[str] = Counter()
-    write, told_s = counter(Path(f"{folder}.counts")), 0.0
+    write, reported_s = counter(Path(f"{folder}.counts")), 0.0
 
     def keep(kind: str, data: bytes) -> None:
         path = Path(folder, kind, f"id:{counts[kind]:06d}")
@@ -116,9 +116,9 @@ def main(arguments: Sequence[str]) -> int:
         replace_file(path, data)
 
     def tell() -> None:
-        nonlocal told_s
-        if time.monotonic() - told_s >= TOLD_S:
-            told_s = time.monotonic()
+        nonlocal reported_s
+        if time.monotonic() - reported_s >= TOLD_S:
+            reported_s = time.monotonic()
             write(target.executions)
 
     seeds = [path.read_bytes() for path in sorted(Path(seeds_folder).iterdir())]

@@ -128,21 +128,21 @@ MS = 24_000
 _BETWEEN_MS = 12
 _FILTER = (100, 10, 20, 100)
 
-Said = tuple[Message, int]
+TimedMessage = tuple[Message, int]
 """A frame, and the milliseconds of silence before it."""
 
 
-def talks(robots: int, slot: int) -> list[list[Said]]:
-    """What a host says, one list a seed."""
+def talks(robots: int, slot: int) -> list[list[TimedMessage]]:
+    """Messages of a host, one list a seed."""
 
     def team(seq: int, speed: int, kind: int = FrameType.TEAM) -> TeamFrame:
         return TeamFrame(kind, seq, ((speed, speed),) * robots)
 
-    def asked(first: int) -> int:
+    def question_seq(first: int) -> int:
         """The number from `first` on with which a question goes to this robot."""
         return next(seq for seq in range(first, first + robots) if seq % robots == slot)
 
-    poll = asked(1)
+    poll = question_seq(1)
     return [
         [(team(1, 900), 0)],
         [(team(1, 16_633), 0), (team(2, -16_633), _BETWEEN_MS), (team(3, 0), _BETWEEN_MS)],
@@ -159,7 +159,7 @@ def talks(robots: int, slot: int) -> list[list[Said]]:
     ]
 
 
-def sent(talk: Sequence[Said], robots: int) -> list[Transmission]:
+def sent(talk: Sequence[TimedMessage], robots: int) -> list[Transmission]:
     """A talk as what goes over the air."""
     transmissions: list[Transmission] = []
     end_tick = 0

@@ -1,4 +1,4 @@
-"""Wire formats by name, or in a file that the command line names, and their mistakes told as bad input."""
+"""Wire formats by name, or in a file that the command line names, and their mistakes reported as bad input."""
 
 from __future__ import annotations
 
@@ -64,7 +64,7 @@ def _class_in_file(text: str) -> tuple[type[Protocol], str, str] | None:
     return PROTOCOLS.of_file(path, name, OPTION), name, parameters
 
 
-def asked(method: Callable[..., object], call: Callable[[], T]) -> T:
+def called(method: Callable[..., object], call: Callable[[], T]) -> T:
     """The result of a protocol's method. Raises BadInput where it fails itself."""
     try:
         return call()

@@ -1,4 +1,4 @@
-"""What becomes of an input that failed: minimised, told apart from the others, confirmed in a World, left as files.
+"""What becomes of an input that failed: minimised, distinguished from the others, confirmed in a World, left as files.
 
 Two crashes are the same where check and cause are. The cause of a fault is the instruction that went wrong first
 (`cause.py`). Where no instruction did it (nothing came in time, say) it is what the check says, but for its numbers.
@@ -40,17 +40,17 @@ _DIGITS = 6
 
 
 class CrashKey(msgspec.Struct, frozen=True):
-    """By what crashes are told apart. `said`: of a check without an instruction, what was wrong without its numbers."""
+    """The key by which crashes differ. `reason`: of a check without an instruction, its message without numbers."""
 
     check: str
     cause: Cause | None
-    said: str
+    reason: str
 
     @property
     def name(self) -> str:
         if self.cause is not None:
             return f"{self.check}-{self.cause.pc:04x}"
-        return f"{self.check}-{hashlib.sha256(self.said.encode()).hexdigest()[:_DIGITS]}"
+        return f"{self.check}-{hashlib.sha256(self.reason.encode()).hexdigest()[:_DIGITS]}"
 
 
 class Crash(msgspec.Struct, frozen=True, kw_only=True):
@@ -79,7 +79,7 @@ class Crash(msgspec.Struct, frozen=True, kw_only=True):
 class Triage:
     """All that was found so far. `more`: by name, inputs that came down to the same crash or were not looked at.
 
-    `unrepeated`: inputs that the engine said had failed and that do not fail again.
+    `unrepeated`: inputs that the engine reported as failed and that do not fail again.
     """
 
     reached: InputCoverage
@@ -156,12 +156,12 @@ class Triage:
         small = minimise(data, fails, tries, self.minimise_s, self.tell)
         verdict, what = judged(small)
         if verdict.failure is None and small != data:
-            whole, said = judged(data)
+            whole, message = judged(data)
             if whole.failure is not None:  # smaller, it is only the target's
-                small, verdict, what = data, whole, said
+                small, verdict, what = data, whole, message
         key = self._key(group, small, verdict, what)
         known = self._by_name.get(key.name)
-        if known is None and group[1] is None:  # unconfirmed ones are told apart by what the target says
+        if known is None and group[1] is None:  # unconfirmed ones differ by the target's message
             known = self._by_name.pop(self._key(group, small, None, what).name, None)
         if known is not None:
             self._count(known, group)
@@ -181,7 +181,7 @@ class Triage:
         self._last[group] = known
 
     def _key(self, group: tuple[str, int | None], data: bytes, verdict: Run | None, what: str) -> CrashKey:
-        """By what an input is told apart. A fault needs no verdict for that."""
+        """The key of the crash that an input shows. A fault needs no verdict for that."""
         check, pc = group
         if pc is not None:
             return CrashKey(check, self.reached.cause(data, pc), "")
@@ -246,7 +246,7 @@ def minimise(
     """
     end_s = time.monotonic() + time_s
 
-    def asked(one: bytes) -> bool:
+    def attempt(one: bytes) -> bool:
         nonlocal tries
         if tries <= 0 or time.monotonic() >= end_s:
             return False
@@ -254,15 +254,15 @@ def minimise(
         tell()
         return still(one)
 
-    before = None if asked(data) else data
+    before = None if attempt(data) else data
     while data != before:
         before = data
-        data = _simpler(data, asked, lambda chunk: b"")
-        data = _simpler(data, asked, lambda chunk: bytes(len(chunk)))
+        data = _simpler(data, attempt, lambda chunk: b"")
+        data = _simpler(data, attempt, lambda chunk: bytes(len(chunk)))
     return data
 
 
-def _simpler(data: bytes, asked: Question, instead: Callable[[bytes], bytes]) -> bytes:
+def _simpler(data: bytes, attempt: Question, instead: Callable[[bytes], bytes]) -> bytes:
     """What is put in the place of chunks, from the end on: what comes after the crash goes first."""
     size = max(1, len(data) // 2)
     while size:
@@ -270,7 +270,7 @@ def _simpler(data: bytes, asked: Question, instead: Callable[[bytes], bytes]) ->
         while end > 0:
             begin = max(0, end - size)
             simpler = data[:begin] + instead(data[begin:end]) + data[end:]
-            if simpler != data and asked(simpler):
+            if simpler != data and attempt(simpler):
                 data = simpler
             end = begin
         size //= 2

@@ -237,7 +237,7 @@ class FaultMessage(msgspec.Struct, frozen=True, gc=False):
 
 
 class WireMessage(msgspec.Struct, frozen=True, gc=False):
-    """`wire`: characters without a pause; `>` host to robot, as sent; `<` robot to host, as the PC heard them.
+    """`wire`: characters without a pause; `>` host to robot, as sent; `<` robot to host, as the PC received them.
 
     `data` in hex; `bad_stop`: indices of the characters whose stop bit is bad.
     """

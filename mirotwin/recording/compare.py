@@ -83,7 +83,7 @@ def differences(
 
 
 def _all(one: Sequence[Period], other: Sequence[Period], rule: CompareRule) -> Iterator[Difference]:
-    """Causes before effects: of those at one tick the first is the first to be told."""
+    """Causes before effects: at one tick the first is reported first."""
     if rule.kind in ("bits", "commands"):
         yield from _commands(one, other, rule)
     if rule.kind in ("bits", "bytes"):
@@ -105,7 +105,7 @@ def _all(one: Sequence[Period], other: Sequence[Period], rule: CompareRule) -> I
 Value = int | float | str | None
 NamedValues = Iterator[tuple[str, Value]]
 COUNTERS = ("firmware accepted", "firmware rejected", "firmware stale")
-"""Absent where an image exports no such symbols: nothing is said about them then."""
+"""Absent where an image exports no such symbols: they are not compared then."""
 Named = Iterator[tuple[str, Value, Value]]
 
 

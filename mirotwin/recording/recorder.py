@@ -142,7 +142,7 @@ class Recorder:
         self._writer.finish()
 
     def flush(self) -> None:
-        """What was added up to now is kept even if this process is killed."""
+        """Saves what was added up to now, even if this process is killed."""
         with self._undisturbed:
             self._write_waiting()
             self._writer.flush()

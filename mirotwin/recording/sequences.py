@@ -16,7 +16,7 @@ SAME_TICKS = CONTROL_PERIOD_TICKS // 2
 
 
 class LogEntry(NamedTuple):
-    """Something with a tick; `text` says all of it but when. `said`: what it was, for who reads more than the text."""
+    """Something with a tick; `text` says all of it but when. `said`: the object itself, for more than the text."""
 
     tick: int
     text: str
@@ -32,7 +32,7 @@ Pair = tuple[LogEntry | None, LogEntry | None]
 def commands(periods: Sequence[Period], index: int, side: str, answers: bool) -> list[LogEntry]:
     """Complete commands to one LM629 of the robot in place `index`; with `answers` also what it gave back.
 
-    What a chip answers, a position say, depends on when it was asked.
+    What a chip answers, a position say, depends on when it was read.
     """
     logged = (command for period in periods for command in getattr(period.robots[index], side).commands)
     return [LogEntry(tick, _command(opcode, data, answers)) for tick, opcode, data in logged]
@@ -74,7 +74,7 @@ def _action(action: Action) -> str:
 
 
 def on_air(periods: Sequence[Period], network: int, sent: bool) -> Iterator[Transmission]:
-    """What was said on a network's air: by its host as `sent`, or else by its robots as the PC heard them."""
+    """What was on a network's air: `sent` by its host, or else received by the PC from its robots."""
     for period in periods:
         for transmission in period.wire:
             if transmission.network == network and (transmission.direction == DOWN) == sent:

@@ -30,7 +30,7 @@ SETTLED_CM = 3.0
 SETTLED_RAD = 0.15
 NAN = math.nan
 LONGEST_FRAMES = 40
-"""More than any camera's delay: so long a reference is kept."""
+"""More than any camera's delay: a reference is held for as long."""
 
 Column: TypeAlias = "array[float]"
 

@@ -77,7 +77,7 @@ class RunDifference(msgspec.Struct, frozen=True):
         return min(each.period for each in self.differences)
 
     @property
-    def seen_tick(self) -> int:
+    def observed_tick(self) -> int:
         """When something differs that is more than a digest: dead bytes of a stack are enough for that."""
         ticks = [each.tick for each in self.differences if each.channel != DIGEST]
         return (ticks or [self.differences[0].tick])[0]
@@ -173,7 +173,7 @@ def _repeated(
             other_way.world,
             annotate[0](way.image),
             annotate[1](other_way.image),
-            difference.seen_tick + LOOK_TICKS,
+            difference.observed_tick + LOOK_TICKS,
         )
     return replace(difference, state=state, instruction=instruction)
 

@@ -114,7 +114,7 @@ def _place(difference: InstructionDifference | VariableDifference, runs: RunDiff
 
 
 SHOWN = 20
-"""Frames in the list unless all are asked for."""
+"""Frames in the list unless all are requested."""
 
 
 def frame_tables(

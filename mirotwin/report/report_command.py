@@ -171,7 +171,10 @@ def _of_case(wanted: ReportOptions, job: Job, name: str) -> Material:
         periods=[period for period in again.periods if period.index in wanted.shown],
         sources=source_folders(job.spec.image, wanted.sources),
         command=_command(wanted, job),
-        notes=[*([_played_with(job.spec.image, "case")] if job.case.changed else []), *_said(job, again)],
+        notes=[
+            *([_played_with(job.spec.image, "case")] if job.case.changed else []),
+            *_verdict_note(job, again),
+        ],
         name=(name or Path(job.spec.origin).absolute().parent.name) if text else "",
         report=text,
         verdict="failed" if text and not again.result.failures else "",
@@ -191,7 +194,7 @@ def _played_with(image: Image, kind: str, recorded: Image | None = None) -> str:
     )
 
 
-def _said(job: Job, again: WatchedRun) -> list[str]:
+def _verdict_note(job: Job, again: WatchedRun) -> list[str]:
     """What became of a case's verdict."""
     verdict = job.case.verdict
     if not verdict or verdict in map(str, again.result.failures):

@@ -28,7 +28,7 @@ CHAPTERS: tuple[Chapter, ...] = (
 ALL: tuple[Rule, ...] = tuple(rule for chapter in CHAPTERS for rule in chapter.rules)
 LONG: tuple[Rule, ...] = tuple(sound.LONG.rules)
 RULES: tuple[Rule, ...] = tuple(rule for rule in ALL if rule not in LONG)
-"""Those that are tried unless others are asked for."""
+"""The rules that are tried unless others are requested."""
 _BY_ID = {rule.id: rule for rule in ALL}
 
 

@@ -55,19 +55,19 @@ def form(script: TrialScript) -> None:
     end = script.now
 
     @script.expects(end, f"an answer to some of {3 * script.n} questions in a row")
-    def any_heard(observed: Observed) -> Found:
-        if not observed.heard:
+    def any_received(observed: Observed) -> Found:
+        if not observed.received:
             yield end, "none"
 
 
 def _formed(script: TrialScript, question: Frame, then_more: bool = False) -> None:
-    """What is said then, if anything, is formed as an answer. `then_more`: another one may follow at once."""
+    """Characters that come then, if any, are formed as an answer. `then_more`: another one may follow at once."""
     until = question.end_tick + ms(56.0)
     wanted = f"an answer of 19 characters without a pause, {_HEAD.hex(' ')} first, at 9615 baud"
 
     @script.expects(until, wanted)
     def test(observed: Observed) -> Found:
-        received: Sequence[Event] = within(observed.heard, question.last_tick, until)
+        received: Sequence[Event] = within(observed.received, question.last_tick, until)
         received = received[: TELEMETRY.wire_size] if then_more else in_a_row(received)
         if received and (reason := _badly_formed(received, question, observed)):
             yield received[-1].tick, f"{characters(received)}: {reason}"
@@ -152,7 +152,7 @@ def flags(script: TrialScript) -> None:
     script.ask(lead=b"", gap_ms=40.0)
     _says_flags(script, 0)
     for silence_ms, wanted in ((140.0, Flags.STOPPED), (560.0, both)):
-        for _ in range(2):  # what happened twice is told once
+        for _ in range(2):  # what happened twice is reported once
             script.team()
             script.wait(silence_ms)
         _says_flags(script, wanted)
@@ -209,7 +209,7 @@ def _status(content: TelemetryFrame, answer: ReceivedAnswer, observed: Observed)
 
 
 def _around(answer: ReceivedAnswer, observed: Observed) -> tuple[RobotPeriod, RobotPeriod]:
-    """The robot at the start of the last control period before an answer was asked for, and of the first after it."""
+    """The robot at the start of the last control period before an answer was requested, and of the first after it."""
     begun = answer.frame.start_tick - ms(14.0)
     before = [record for tick, record in observed.periods if tick <= begun]
     after = [record for tick, record in observed.periods if tick >= answer.tick]

@@ -57,7 +57,7 @@ def words(script: TrialScript) -> None:
     ]  # fmt: skip
     pairs += [(0x55AA >> 2, -0x2AD5), (0, 300), (-300, 0), (4097, 16), (-16633, 16632)]
     for left, right in pairs:
-        _told(script, left, right)
+        _drive(script, left, right)
 
 
 @CHAPTER.rule("P26", FRAME, presupposes="P19")
@@ -74,11 +74,11 @@ def saturation(script: TrialScript) -> None:
         (20000, 100),
         (-100, -20000),
     ):
-        _told(script, left, right)
+        _drive(script, left, right)
 
 
-def _told(script: TrialScript, left: int, right: int, **how: Unpack[How]) -> Frame:
-    """A frame with these velocities, and what is expected of it."""
+def _drive(script: TrialScript, left: int, right: int, **how: Unpack[How]) -> Frame:
+    """Sends a frame with these velocities, and expects that the wheels obey it."""
     return script.obeyed(
         script.team(script.same(left, right), what=f"team frame with {left}, {right}", **how)
     )
@@ -100,7 +100,7 @@ def one_sample(script: TrialScript) -> None:
 def _together(script: TrialScript, after_tick: int, until_tick: int, what: str) -> None:
     @script.expects(until_tick, f"{what}: STT of both wheels in one sample")
     def test(observed: Observed) -> Found:
-        left, right = observed.both_told(until_tick)
+        left, right = observed.both_orders(until_tick)
         if min(left.tick, right.tick) <= after_tick:
             yield until_tick, "a wheel that was told nothing"
         grid = observed.samples[-1][1]
@@ -112,13 +112,13 @@ def _together(script: TrialScript, after_tick: int, until_tick: int, what: str) 
 def kept(script: TrialScript) -> None:
     """Between frames the wheels MUST keep their velocities."""
     for sign in (1, -1, 1):
-        frame = _told(script, 300 * sign, -311 * sign, gap_ms=65.0)
+        frame = _drive(script, 300 * sign, -311 * sign, gap_ms=65.0)
         script.unchanged(frame.acted_tick, script.now, f"velocities kept after {frame.what}")
         _reached(script, frame)
 
 
 def _why_not_reached(observed: Observed, tick: int) -> str:
-    orders = observed.both_told(tick)
+    orders = observed.both_orders(tick)
     if not all(order.moves for order in orders):
         return ""
     if not all(order.acceleration for order in orders):

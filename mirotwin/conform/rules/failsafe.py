@@ -185,7 +185,7 @@ def _in_time(script: TrialScript, last: Frame, after_ticks: int, what: str, want
     earliest, latest = rule.earliest_tick(), rule.latest_tick()
 
     def done(observed: Observed, side: str, tick: int) -> bool:
-        order = observed.told(side, tick)
+        order = observed.last_order(side, tick)
         return order.what == "off" if what == "off" else not order.moves
 
     def when(observed: Observed, side: str) -> str:
@@ -200,7 +200,7 @@ def _in_time(script: TrialScript, last: Frame, after_ticks: int, what: str, want
     @script.expects(latest, f"{wanted} {window} after the end of {last.what}")
     def test(observed: Observed) -> Found:
         for side in SIDES:
-            order = observed.told(side, earliest)
+            order = observed.last_order(side, earliest)
             if done(observed, side, earliest) and order.tick <= last.tick:
                 yield latest, f"the {side} one told {in_words(order)} before it already"
             elif done(observed, side, earliest):

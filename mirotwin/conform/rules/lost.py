@@ -13,7 +13,7 @@ from mirotwin.conform.trial_script import Frame, TrialScript, ms
 
 CHAPTER = Chapter("Wheels that do not follow")
 _POSITION_ERROR = 0x20
-_SPEED = 2000  # 1024 counts away 60 ms after it is told
+_SPEED = 2000  # 1024 counts away 60 ms after the order
 _OFF_MS = 80.0
 _GAINS = (400, 40, 3000, 2000)
 
@@ -24,7 +24,7 @@ def lost(script: TrialScript) -> None:
     whatever velocities come, until a fresh frame tells both wheels to stand.
     """
     for left, right in ((_SPEED, 0), (0, _SPEED), (_SPEED, _SPEED)):
-        first = _told_in_vain(script, left, right)
+        first = _turn_in_vain(script, left, right)
         script.filter(_GAINS, "filter frame with gains")
         for _ in range(3):
             script.team()
@@ -37,14 +37,14 @@ def lost_is_told(script: TrialScript) -> None:
     """While a wheel is lost, the status of its LM629 in answers MUST show it (20h). After both wheels were told to
     stand, velocities MUST be obeyed again.
     """
-    _told_in_vain(script, _SPEED, 0)
+    _turn_in_vain(script, _SPEED, 0)
     script.filter(_GAINS, "filter frame with gains")
     script.answered(script.ask(gap_ms=36.0), "status 20h of the left LM629", _shows_error)
     script.team(((0, 0),) * script.n, gap_ms=40.0)
     script.obeyed(script.team())
 
 
-def _told_in_vain(script: TrialScript, left: int, right: int) -> Frame:
+def _turn_in_vain(script: TrialScript, left: int, right: int) -> Frame:
     """The first of some frames, questions too, that tell wheels without gains to turn."""
     script.filter((0, 0, 0, 0), "filter frame without gains")
     words = script.same(left, right)

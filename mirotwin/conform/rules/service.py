@@ -106,7 +106,7 @@ def _driven_with(script: TrialScript, frame: Frame, value: int) -> None:
 
     @script.expects(frame.acted_tick, f"acceleration {number(value, 8)} in force with {frame.what}")
     def test(observed: Observed) -> Found:
-        for order in observed.both_told(frame.acted_tick):
+        for order in observed.both_orders(frame.acted_tick):
             if order.acceleration != value:
                 yield frame.acted_tick, f"{number(order.acceleration, 8)} in the {order.side} one"
 

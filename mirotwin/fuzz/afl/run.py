@@ -93,7 +93,7 @@ _ELSE = "its whole output is in the file named first"
 
 
 def why_ended(log: Path, target: Path) -> BadInput:
-    """What is to be told of an afl-fuzz that ended by itself with an error.
+    """The error to report of an afl-fuzz that ended with one.
 
     `log` is its output. `target` is what the target process complained of, if it did: that is the cause then.
     """

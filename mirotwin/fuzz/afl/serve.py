@@ -71,7 +71,7 @@ RUNS_A_COUNT = 64
 
 
 def wait_status(kind: int) -> int:
-    """What AFL++ is told of a run that gave `kind`: 0, or a signal, which is the number in a crash's file name."""
+    """The status that AFL++ receives for a run of this `kind`: 0, or a signal, the number in a crash's file name."""
     return min(FIRST_SIGNAL + kind - 1, LAST_SIGNAL) if kind else 0
 
 
@@ -82,7 +82,7 @@ def hello(map_size: int) -> bytes:
 
 
 def answer(target: Target, cases: memoryview, control: int, status: int, keep: Callable[[int], None]) -> None:
-    """Runs what AFL++ puts into `cases` until it closes `control`. `keep` is told the executions now and then."""
+    """Runs the inputs that AFL++ puts into `cases` until it closes `control`. `keep` gets the executions at times."""
     length, data = cases[:4].cast("I"), cases[4:]
     answers = [struct.pack("<II", NO_PROCESS, wait_status(kind)) for kind in range(256)]
     run, read, write = target.run, os.read, os.write

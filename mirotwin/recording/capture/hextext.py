@@ -47,7 +47,7 @@ class HexText:
         return complete and bool(_NOT_DIGITS.sub(b"", match.group()))
 
     def feed(self, text: bytes) -> bytes:
-        """The bytes of the pairs that are complete; what is wrong is kept until the next call."""
+        """The bytes of the pairs that are complete; an error waits until the next call."""
         if self._rest and not self._pending():
             self.finish()
         if self._comment:

@@ -78,27 +78,27 @@ def is_telemetry(head: Sequence[Transmission]) -> bool:
 
 
 class Layouts:
-    """3 or 5 for each network: what the user `said`, else what the file says, else what its `head` looks like.
+    """3 or 5 for each network: as the user `requested`, else as the file says, else as its `head` looks.
 
-    `tell` gets what the user should hear about a choice that was not plain.
+    `tell` receives a note for the user about a choice that was not plain.
     """
 
     def __init__(
         self, requested: int | None, source: Source, head: Sequence[Transmission], tell: Callable[[str], None]
     ) -> None:
-        self.said = requested
+        self.requested = requested
         self.source = source
         self.head = head
         self.tell = tell
         self.found: dict[int, int] = {}
 
     def of(self, network: int) -> int:
-        """InputError for more networks than decoders are kept for."""
+        """InputError for more networks than there may be decoders."""
         if network not in self.found:
             if len(self.found) == MOST_NETWORKS:
                 reason = f"characters of more than {MOST_NETWORKS} networks"
                 raise InputError(self.source.label, reason, "take one out with `mirotwin export --network`")
-            count = self.said or self.source.robots.get(network)
+            count = self.requested or self.source.robots.get(network)
             if count is None:
                 count, note = robots_in(self.head, network)
                 if note:

@@ -193,9 +193,9 @@ def _packets(sent: Iterable[Transmission]) -> Iterator[Transmission]:
 
 
 def to_stream(sent: Iterable[Transmission], layout: Callable[[int], int]) -> Iterator[bytes]:
-    """A line a transmission, with what it says as comment. ConversionError for ticks that go backwards.
+    """A line a transmission, with its content as comment. ConversionError for ticks that go backwards.
 
-    The first line names the version, which is known after the last transmission: until then lines are kept in a
+    The first line names the version, which is known after the last transmission: until then lines wait in a
     temporary file.
     """
     version, last = 1, 0

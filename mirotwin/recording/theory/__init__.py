@@ -1,1 +1,1 @@
-"""The paper's theory along a run: what is kept of each control period, and the figures that it comes to."""
+"""The paper's theory along a run: what is saved of each control period, and the figures that it comes to."""

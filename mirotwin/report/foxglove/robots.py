@@ -101,14 +101,14 @@ class Trail:
 
     def __init__(self) -> None:
         self._truth: deque[Point] = deque(maxlen=KEPT)
-        self._seen: deque[Point] = deque(maxlen=KEPT)
+        self._measured: deque[Point] = deque(maxlen=KEPT)
 
     def add(self, robot: RobotPeriod, index: int, time: Timestamp) -> Iterator[SceneEntity]:
         """The trails up to control period `index`, which is added."""
         frame = robot_frame(robot.network, robot.slot)
         for name, past, posture, color in (
             ("truth", self._truth, robot.truth, shapes.paint("side")),
-            ("measured", self._seen, robot.measurement, MEASURED),
+            ("measured", self._measured, robot.measurement, MEASURED),
         ):
             points = [*past, *(() if posture is None else ((posture.x_m, posture.y_m),))]
             if posture is not None and index % EVERY == 0:

@@ -140,10 +140,10 @@ def _named(sent: Transmission, robots: int) -> str:
     """What the frames in a transmission say; empty where it holds none."""
     decoder = Decoder(robots)
     frames = [one for one in [*decoder.hear(sent), *decoder.flush()] if isinstance(one, Received)]
-    return ", ".join(_said(frame, robots) for frame in frames)
+    return ", ".join(_content(frame, robots) for frame in frames)
 
 
-def _said(frame: Received, robots: int) -> str:
+def _content(frame: Received, robots: int) -> str:
     try:
         return describe(frame.message(robots))
     except ContentError:
@@ -213,8 +213,8 @@ def _fate(fresh: bool | None, damaged: int, at_the_end: bool) -> str:
 
 
 def _answers(received: Sequence[Transmission], events: Sequence[Event], network: int) -> list[LinkMark]:
-    """What the PC heard: characters without a valid answer are a damaged one, or too few for that, noise."""
-    answers = [(event.tick, _said(event.frame, 3)) for event in events if event.frame is not None]
+    """Receptions of the PC: characters without a valid answer are a damaged one, or too few for that, noise."""
+    answers = [(event.tick, _content(event.frame, 3)) for event in events if event.frame is not None]
     marks = []
     for transmission in received:
         end = transmission.tick + len(transmission.data) * ROBOT_CHARACTER_TICKS

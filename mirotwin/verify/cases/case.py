@@ -73,7 +73,7 @@ def case_text(
 ) -> str:
     """The case of `world`, which ends at `end_tick`; default: where the world is now.
 
-    `expect`: the check that failed, as in `[expect]`; `verdict`: what it said.
+    `expect`: the check that failed, as in `[expect]`; `verdict`: its message.
     """
     scenario = world.scenario
     end_tick = world.tick if end_tick is None else end_tick

@@ -14,7 +14,7 @@ from mirotwin.verify.expectations import Expected
 
 
 class CaseOptions(Options, frozen=True, kw_only=True):
-    """What `mirotwin replay` is told of a case; the command has more options."""
+    """Options of `mirotwin replay` for a case; the command has more."""
 
     COMMAND = "replay"
     file: Annotated[str, Argument("FILE", NAME)]
@@ -26,7 +26,7 @@ class CaseOptions(Options, frozen=True, kw_only=True):
 
 
 class DebugLineOptions(CaseOptions, frozen=True, kw_only=True):
-    """What `mirotwin debug` is told of a case or a recording; the command has more options."""
+    """Options of `mirotwin debug` for a case or a recording; the command has more."""
 
     COMMAND = "debug"
     at: Annotated[str, Option(help="Where to stand first.")] = ""
@@ -55,5 +55,5 @@ def replay_line(
 
 
 def foreign_path(image: Image) -> Path | None:
-    """The path by which a command is told of `image`; None for the robot's own, which needs no word."""
+    """The path that names `image` to a command; None for the robot's own, which needs no name."""
     return None if image.path.resolve() == image_path().resolve() else image.path

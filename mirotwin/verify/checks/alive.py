@@ -65,44 +65,44 @@ def frames_needed(params: Radio, characters: int) -> int:
 
 
 class _Wheel:
-    """One wheel. `asked`: the speed of the last frame when it was told something last, None while nobody knows; the
-    counts: frames since it was told something, and since its motor was driven. `told`: in the last control period.
+    """One wheel. `requested`: the speed of the last frame at the last order to it; None while that is unknown. The
+    counts: frames since that order, and since its motor was driven. `ordered`: in the last control period.
     """
 
     def __init__(self) -> None:
-        self.asked: int | None = 0
-        self.untold = 0
+        self.requested: int | None = 0
+        self.unordered = 0
         self.undriven = 0
-        self.told = self.driven = False
+        self.ordered = self.driven = False
         self.position: int | None = None
 
     def look(self, axis: Axis, word: int | None) -> None:
-        self.told = False
+        self.ordered = False
         for _, opcode, _ in axis.commands:
             if opcode == _STT:
-                self.told = True
+                self.ordered = True
                 break
         position = axis.real_position
         self.driven = axis.pwm_magnitude != 0 or (position != self.position and self.position is not None)
-        if self.told:
-            self.asked = word
-            self.untold = 0
+        if self.ordered:
+            self.requested = word
+            self.unordered = 0
         if self.driven:
             self.undriven = 0
         self.position = position
 
     def ask(self, word: int) -> None:
-        if self.asked is None:
-            self.asked = word
+        if self.requested is None:
+            self.requested = word
         if abs(word) >= SLOWEST:
-            self.untold += word != self.asked
+            self.unordered += word != self.requested
             self.undriven += 1
 
 
 class AliveMonitor(Monitor[ActsAtAll]):
     """`waiting`: (end, air before, velocities) of frames that are not counted yet.
 
-    `counted`: frames that asked for something; `shown`: frames to a robot that had just acted, which are not decoded:
+    `counted`: frames that requested a speed; `shown`: frames to a robot that had just acted, which are not decoded:
     that would take a tenth of the loop.
     """
 
@@ -118,7 +118,7 @@ class AliveMonitor(Monitor[ActsAtAll]):
         self.freshness = Freshness()
         self.board = subject.robot.board
         self.listener = None if radio is None else radio.listeners[subject.slot]
-        self.seen: list[tuple[int, int]] = []
+        self.unjudged: list[tuple[int, int]] = []
         """Air, and tick of the last reset, at the end of each control period that is not judged, oldest first."""
         self.counted = self.shown = 0
         self.begun_tick = -1
@@ -126,20 +126,20 @@ class AliveMonitor(Monitor[ActsAtAll]):
         self.reset_tick = self.chip.reset_tick
         self.resets: list[int] = []  # of the LM629s, that are not judged yet
         self.period_over()
-        self.air = self.before = self.seen.pop()[0]
+        self.air = self.before = self.unjudged.pop()[0]
         self._begin()
 
     def _begin(self) -> None:
         self.waiting: list[Waiting] = []
         self.left, self.right = _Wheel(), _Wheel()
-        self.turned = False  # a wheel was told to turn since the processor began
+        self.turned = False  # a wheel was ordered to turn since the processor began
         self.words: tuple[int | None, int | None] = (0, 0)
 
     def period_over(self) -> None:
         board, listener, air = self.board, self.listener, -1
         if listener is not None and board.powered and not board.held and listener.link_state == UP:
             air = listener.bit_errors
-        self.seen.append((air, self.chip.reset_tick))
+        self.unjudged.append((air, self.chip.reset_tick))
 
     def restarted(self, tick: int) -> None:
         self.begun_tick = tick
@@ -149,8 +149,8 @@ class AliveMonitor(Monitor[ActsAtAll]):
         if not self.needed or not event.good_stop:
             return
         left, right = self.left, self.right
-        if left.told and left.driven and right.told and right.driven:
-            self.words = (None, None)  # alive: what it is asked need not be known
+        if left.ordered and left.driven and right.ordered and right.driven:
+            self.words = (None, None)  # alive: the requested velocities need not be known
             self.shown += 1
             self.judged = int(self.shown >= FRAMES)
             return
@@ -163,7 +163,7 @@ class AliveMonitor(Monitor[ActsAtAll]):
                     self.waiting.append((end_tick, self.before, words))
 
     def period(self, record: RobotPeriod, tick: int) -> None:
-        air, reset_tick = self.seen.pop(0)
+        air, reset_tick = self.unjudged.pop(0)
         if reset_tick != self.reset_tick:
             self.resets.append(reset_tick)
             self.reset_tick = reset_tick
@@ -186,7 +186,7 @@ class AliveMonitor(Monitor[ActsAtAll]):
             self._judge(record, tick)
 
     def _look_at_resets(self, record: RobotPeriod, now: int) -> None:
-        """In the order of time. The board may have gone on: what it has done after `now` is kept for later."""
+        """In the order of time. The board may have gone on: what it has done after `now` waits for the next look."""
         due = [one for one in self.resets if one <= now]
         del self.resets[: len(due)]
         commands = (*record.left.commands, *record.right.commands)
@@ -208,19 +208,19 @@ class AliveMonitor(Monitor[ActsAtAll]):
         return due
 
     def _judge(self, record: RobotPeriod, tick: int) -> None:
-        """Fails where a wheel has just been asked so often."""
+        """Fails where a wheel has just ignored as many frames as are needed."""
         wheels = (("left", self.left), ("right", self.right))
-        untold = [side for side, wheel in wheels if wheel.untold == self.needed]
+        unordered = [side for side, wheel in wheels if wheel.unordered == self.needed]
         undriven = [
-            side for side, wheel in wheels if wheel.undriven == self.needed and wheel.untold < self.needed
+            side for side, wheel in wheels if wheel.undriven == self.needed and wheel.unordered < self.needed
         ]
         wanted = f"a robot that acts on one of {self.needed} frames that reached it"
-        if untold:
+        if unordered:
             accepted = (
                 ""
                 if record.accepted is None
                 else f"; the firmware has accepted {amount(record.accepted, 'frame')}"
             )
-            self.fail(tick, wanted, f"no command to turn the {' and the '.join(untold)} wheel{accepted}")
+            self.fail(tick, wanted, f"no command to turn the {' and the '.join(unordered)} wheel{accepted}")
         if undriven:
             self.fail(tick, wanted, f"the {' and the '.join(undriven)} wheel at rest, its motor not driven")

@@ -62,9 +62,9 @@ class MotorsOff(SilenceCheck, frozen=True, kw_only=True, tag="motors_off_ms"):
 
 
 class SilenceMonitor(OrdersMonitor[SilenceCheck]):
-    """`in_time`: a wheel was told in time. A wheel that needed no order, because it stood, is no occasion to judge.
+    """`in_time`: a wheel received its order in time. A wheel that needs no order, because it stands, is not judged.
 
-    `late`: (end of the last fresh frame, tick of the failure) of wheels that have not been told yet. A wheel that is
+    `late`: (end of the last fresh frame, tick of the failure) of wheels without an order yet. A wheel that is
     lost switches both motors off, at any time: of that silence nothing is judged.
     """
 
@@ -127,8 +127,8 @@ class SilenceMonitor(OrdersMonitor[SilenceCheck]):
         self.rule.last_tick = -1
 
     def _fail_late(self, tick: int) -> None:
-        """Notes the failure of wheels that are late, when it is known how late: at `tick` they are told, or it is given
-        up to wait.
+        """Notes the failure of wheels that are late, once it is known how late: at `tick` they receive their order, or
+        the wait ends.
         """
         if self.late is not None:
             (fresh_tick, latest_tick), self.late = self.late, None

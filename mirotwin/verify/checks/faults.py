@@ -73,7 +73,7 @@ class FaultMonitor(Monitor[FaultCheck]):
 
 
 class Lm629Monitor(FaultMonitor):
-    """`refused`: which chips' status bytes said "command error" the last time."""
+    """`refused`: chips whose status byte reported "command error" the last time."""
 
     def __init__(self, check: FaultCheck, subject: Subject) -> None:
         super().__init__(check, subject)

@@ -47,7 +47,7 @@ EVENT_KINDS = (
 )
 """The kinds that `EVENTS` of a monitor may name."""
 KEPT = 100
-"""Failures of a monitor that are kept; the others are only counted."""
+"""Failures of a monitor that are saved; the others are only counted."""
 
 
 class Failure(msgspec.Struct, frozen=True):
@@ -177,8 +177,8 @@ class Monitor(Generic[C_co]):
     missed = ""
     """Why this run had no occasion for it, if there is more to say than that."""
     LATER = False
-    """Whether it may be told of several control periods at once, which it is if no check hears events of the board. If
-    so, it must not read the robot except in `period_over` and `end`."""
+    """`period` may be called in batches, where no check listens to events of the board. Such a monitor must not read
+    the robot except in `period_over` and `end`."""
 
     def __init__(self, check: C_co, subject: Subject) -> None:
         self.check = check
@@ -214,7 +214,7 @@ class Monitor(Generic[C_co]):
         """A control period is over. The robot can be read as it is now; `period` is called now or later."""
 
     def until(self, tick: int) -> None:
-        """All events before `tick` have been told."""
+        """All events before `tick` have been reported."""
 
     def end(self, tick: int) -> None:
         """The run is over at `tick`."""

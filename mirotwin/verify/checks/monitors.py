@@ -65,7 +65,7 @@ _RESTARTS = ("reset", "power")
 _FROM_PC = ("sent", "heard", "answer", "touch", "radio", *_RESTARTS)
 _BY_TICK = attrgetter("tick")
 TOGETHER = 30
-"""Control periods at most that are told together, to monitors that hear nothing of a board: its log is full sooner."""
+"""Largest number of control periods in one batch, for monitors that listen to no board: its log is full sooner."""
 
 
 class ExpectationFailed(AssertionError):
@@ -80,7 +80,7 @@ class Checks:
     """The checks of a world from now on: what its scenario expects of each robot, and those that are always on.
 
     `expected` replaces that, by network and slot. `cut`: the run may be ended before it is over. `named`: the checks
-    that somebody asked for. Begin with the run: a check does not know what wheels were told before. RuntimeError is
+    that the user named. Begin with the run: a check does not know earlier orders to the wheels. RuntimeError is
     raised if the world is loaded meanwhile, because what a check remembers is not saved.
     """
 
@@ -100,7 +100,7 @@ class Checks:
         self.at_ends = [(one, monitor) for one in self.devices for monitor in one.that_have("period_over")]
         self.finished = False
         self.index = world.index
-        self.untold: list[tuple[Period, int]] = []  # and where the world stood at their end
+        self.unreported: list[tuple[Period, int]] = []  # and where the world stood at their end
         self.together = TOGETHER if all(watched.later for watched in self.devices) else 1
         world.observers.append(self._look)
 
@@ -110,26 +110,26 @@ class Checks:
                 f"control period {period.index} follows {self.index - 1}: the world was loaded; begin new checks then"
             )
         self.index += 1
-        self.untold.append((period, self.world.tick))
+        self.unreported.append((period, self.world.tick))
         try:  # without a call that could be saved: after a simulated period the caches hold nothing of this
             for judge_and_monitor in self.at_ends:
                 judge_and_monitor[1].period_over()
         except (Exception, SystemExit) as error:
             raise judge_and_monitor[0].cannot_judge(judge_and_monitor[1].check, error) from error
-        if len(self.untold) >= self.together:
-            self._tell()
+        if len(self.unreported) >= self.together:
+            self._report()
 
-    def _tell(self) -> None:
-        """Tells of the control periods that were not told of."""
-        untold, self.untold = self.untold, []
-        self._each(lambda watched: watched.look(untold))
+    def _report(self) -> None:
+        """Reports the control periods that were not reported yet."""
+        unreported, self.unreported = self.unreported, []
+        self._each(lambda watched: watched.look(unreported))
 
     def finish(self) -> None:
         """The run is over, by itself or because it was broken off."""
         if not self.finished:
             self.finished = True
             self.world.observers.remove(self._look)
-            self._tell()
+            self._report()
             self._each(_DeviceMonitors.end)
 
     def _each(self, tell: Callable[[_DeviceMonitors], None]) -> None:
@@ -142,12 +142,12 @@ class Checks:
 
     @property
     def monitors(self) -> list[Monitor[Any]]:
-        self._tell()
+        self._report()
         return [monitor for watched in self.devices for monitor in watched.monitors]
 
     @property
     def failures(self) -> list[Failure]:
-        """All that were kept, in the order of time."""
+        """All failures that were saved, in the order of time."""
         return sorted((one for monitor in self.monitors for one in monitor.failures), key=_BY_TICK)
 
     def check(self) -> None:
@@ -186,8 +186,8 @@ class Checks:
 
 
 class _DeviceMonitors:
-    """One device and its monitors. `check`: whose monitor is being told something. `lost`: events that the log did not
-    hold any more when they were asked for.
+    """One device and its monitors. `check`: whose monitor receives something now. `lost`: events that the log did not
+    hold any more when they were requested.
     """
 
     def __init__(
@@ -216,12 +216,12 @@ class _DeviceMonitors:
             for what in monitor.EVENTS:
                 self.of_events.setdefault(what, []).append(monitor)
         self.of_ends, self.of_periods, self.of_times = map(self.that_have, ("period_over", "period", "until"))
-        self.heard_of_pc = {*_RESTARTS, *(what for what in self.of_events if what in _FROM_PC)}
-        self.heard_of_board = {what for what in self.of_events if what not in _FROM_PC}
+        self.pc_kinds = {*_RESTARTS, *(what for what in self.of_events if what in _FROM_PC)}
+        self.board_kinds = {what for what in self.of_events if what not in _FROM_PC}
         if any(what in self.of_events for what in _FROM_RECEIVED):
             self.receiver = self._receiver()
-            self.heard_of_board.add("received")
-        self.later = not self.heard_of_board and all(monitor.LATER for monitor in self.monitors)
+            self.board_kinds.add("received")
+        self.later = not self.board_kinds and all(monitor.LATER for monitor in self.monitors)
 
     def _monitor(self, check: Check) -> Monitor[Any]:
         kind = "board" if self.subject.alone else "robot"
@@ -251,17 +251,17 @@ class _DeviceMonitors:
             for monitor in self.of_periods:
                 self.check = monitor.check
                 monitor.period(period.robots[self.place], period.tick)
-            self._tell(tick)
+            self._report(tick)
 
     def _gather(self) -> None:
-        """What is new in the logs."""
-        for log, kinds in ((self.of_pc, self.heard_of_pc), (self.of_board, self.heard_of_board)):
+        """Reports the new entries of the logs."""
+        for log, kinds in ((self.of_pc, self.pc_kinds), (self.of_board, self.board_kinds)):
             if kinds:
                 self.lost += log.lost
                 self.waiting += [event for _, event in log.read(kinds)]
         self.waiting.sort(key=_BY_TICK)
 
-    def _tell(self, tick: int) -> None:
+    def _report(self, tick: int) -> None:
         """Tells of the events before `tick`, in the order of time."""
         delivered = 0
         for event in self.waiting:
@@ -272,10 +272,10 @@ class _DeviceMonitors:
                 if event.slot != self.device.slot:
                     continue
                 self._restart(event.tick)
-            self._tell_one(event)
+            self._report_one(event)
             if event.what == "received" and self.receiver is not None:
                 for received in self.receiver.character(event.value, event.good_stop, event.tick):
-                    self._tell_one(reception(event, *received))
+                    self._report_one(reception(event, *received))
         del self.waiting[:delivered]
         for monitor in self.of_times:
             self.check = monitor.check
@@ -288,7 +288,7 @@ class _DeviceMonitors:
             self.check = monitor.check
             monitor.restarted(tick)
 
-    def _tell_one(self, event: Event) -> None:
+    def _report_one(self, event: Event) -> None:
         if event.tick < self.subject.begin_tick:
             return
         for monitor in self.of_events.get(event.what, ()):
@@ -299,7 +299,7 @@ class _DeviceMonitors:
         """The run is over, perhaps within a control period."""
         tick = self.world.tick
         self.look(())
-        self._tell(tick + 1)
+        self._report(tick + 1)
         for monitor in self.monitors:
             self.check = monitor.check
             monitor.end(tick)

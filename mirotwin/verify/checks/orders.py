@@ -18,7 +18,7 @@ def saturated(word: int) -> int:
 
 
 class Order(msgspec.Struct, frozen=True):
-    """A wheel is told at `tick`: "off", "stop", or "drive" with this velocity (16.16 counts per sample).
+    """An order to a wheel at `tick`: "off", "stop", or "drive" with this velocity (16.16 counts per sample).
 
     `acceleration` (16.16 counts per sample^2) is the one last loaded, which counts from this order on. `abrupt`: a stop
     without a ramp.

@@ -1,4 +1,4 @@
-"""The check of the wheels' speed: what they are told, and how fast they are."""
+"""The check of the wheels' speed: the requested one and the real one."""
 
 from __future__ import annotations
 

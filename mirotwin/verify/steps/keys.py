@@ -79,14 +79,14 @@ class Step(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_only=True
         """How long it takes at least."""
         return ms_ticks(getattr(self, "for_ms", 0.0))
 
-    def said(self) -> str:
-        """What it is, in a few words."""
+    def in_words(self) -> str:
+        """The step in a few words."""
         value = getattr(self, self.VERB, "")
         return f"{self.VERB} {value}" if isinstance(value, str | int) else self.VERB
 
     def __str__(self) -> str:
         note = f" ({self.note})" if self.note else ""
-        return f"step {self.number}{note}: {self.said()}"
+        return f"step {self.number}{note}: {self.in_words()}"
 
 
 class OfNetwork(Step, frozen=True, kw_only=True):
@@ -111,7 +111,7 @@ class Send(OfNetwork, frozen=True, kw_only=True, tag_field="send", omit_defaults
         bad_stop = getattr(self, "bad_stop", ()) or "!" in getattr(self, "hex", "")
         return "bad stop" if bad_stop else None
 
-    def said(self) -> str:
+    def in_words(self) -> str:
         return f"send {self.__struct_config__.tag}"
 
 
@@ -154,7 +154,7 @@ class SendFrame(Send, frozen=True, kw_only=True):
 
 
 class SendTeam(SendFrame, frozen=True, kw_only=True, tag="team"):
-    """Velocities. A wheel that is not given keeps what it was told last; at first that is 0.
+    """Velocities. A wheel that is not given keeps its last velocity; at first that is 0.
 
     `left_m_s`, `right_m_s`: of the robot in `slot`; or `team_m_s`: of all slots. `ask`: a frame of type 3, to which
     robot (seq mod N) answers.
@@ -182,7 +182,7 @@ class SendTeam(SendFrame, frozen=True, kw_only=True, tag="team"):
 
 
 class SendPoll(SendFrame, frozen=True, kw_only=True, tag="poll"):
-    """A team frame of type 3 whose number asks the robot in `slot` to answer; all velocities as they were told last."""
+    """A team frame of type 3 whose number asks the robot in `slot` to answer; all velocities as they were sent last."""
 
     def problem(self, network: ScenarioNetwork) -> str:
         if None not in (self.seq, self.slot) and self.seq % network.robots != self.slot:  # type: ignore[operator]
@@ -261,10 +261,10 @@ SENDS: dict[str, type[Send]] = {
 
 
 class StreamStep(OfRobot, frozen=True, kw_only=True):
-    """`stream = "on"`: from now on team frames go out by themselves, as a station's do, with the velocities told last.
+    """`stream = "on"`: from now on team frames go out by themselves, as a station's do, with the velocities sent last.
 
     `every_ms`: left out, a camera period (33.367). `frames`: so many, and then no more. `slot`, `left_m_s`,
-    `right_m_s`: velocities that are told first. `ask`: each asks the robot whose turn it is. `"off"`: no more.
+    `right_m_s`: velocities that are sent first. `ask`: each asks the robot whose turn it is. `"off"`: no more.
     """
 
     VERB = "stream"
@@ -314,7 +314,7 @@ class ConditionStep(Step, frozen=True, kw_only=True):
     def network(self) -> int:
         return self.condition.network
 
-    def said(self) -> str:
+    def in_words(self) -> str:
         return f"{self.verb} {self.condition.what}"
 
     def problem(self, network: ScenarioNetwork) -> str:
@@ -377,7 +377,7 @@ class CheckStep(OfRobot, frozen=True, kw_only=True):
     network_: Network | None = msgspec.field(default=None, name="network")
     checks: tuple[Check, ...] = ()
 
-    def said(self) -> str:
+    def in_words(self) -> str:
         return f"check {', '.join(self.check)}"
 
     def problem(self, network: ScenarioNetwork) -> str:

@@ -141,7 +141,7 @@ class _Table:
                 self.refuse(key, "unknown key", remedy)
 
     def made(self, given: Mapping[str, Any], struct: type[S], kind: type[msgspec.Struct]) -> S:
-        """The step; what msgspec finds in it, or in its condition of this `kind`, is told in the scenario's words."""
+        """The step. Errors of msgspec in it, or in its condition of this `kind`, get the scenario's words."""
         try:
             return msgspec.convert(dict(given), struct)
         except msgspec.ValidationError as error:
