@@ -32,7 +32,7 @@ SHOWN = 20
 
 
 class _Found(NamedTuple):
-    """What came out: control points and calibration, and the further texts to write."""
+    """The result of a calibration: control points and calibration, and the further texts to write."""
 
     points: list[ControlPoint]
     calibration: Calibration

@@ -31,9 +31,9 @@ _DAMAGED = (
     struct.error,
     zlib.error,
 )
-"""What Pillow raises for pictures that are damaged: an `iCCP` chunk that is empty is an IndexError."""
+"""Errors that Pillow raises for damaged pictures: an empty `iCCP` chunk is an IndexError."""
 _ROWS = 12
-"""Rows that a camera is asked for at once."""
+"""Rows that are requested of a camera at once."""
 
 
 class Picture:

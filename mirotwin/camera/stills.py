@@ -72,7 +72,7 @@ def _of_recording(path: Path, network: int, tell: Callable[[str], None]) -> Iter
             tell(str(error))
         messages.check_ours()
     if not any_frame:
-        what = f"no frames of the camera of network {network}"
-        raise messages.error(what, "record them: mirotwin run .. --record-frames")
+        reason = f"no frames of the camera of network {network}"
+        raise messages.error(reason, "record them: mirotwin run .. --record-frames")
     if messages.broken_off:
         tell(messages.broken_off)

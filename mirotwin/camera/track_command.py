@@ -111,7 +111,7 @@ def _utf8(name: str) -> str:
 
 
 def _json_line(frame: int, name: str, tick: int, robot: int, sighting: Sighting | None) -> str:
-    """What is measured is null for a lost robot."""
+    """A line of JSON; the measured values of a lost robot are null."""
     line = {"frame": frame, "picture": name, "tick": tick, "robot": robot, "lost": sighting is None}
     measured = {field: getattr(sighting, field, None) for field in ("x_m", "y_m", "theta_rad", "confidence")}
     return msgspec.json.encode(line | measured).decode()

@@ -60,7 +60,7 @@ class View:
         return png(draw(picture, self.sight.tracker, None if self.missed else self.notes, self.caption()))
 
     def caption(self) -> str:
-        """What the line below the picture says."""
+        """The text of the line below the picture."""
         missed = "   not received by the PC" if self.missed else ""
         team = self.sight.tracker.team
         return f"{self.label}   {team}   frame {self.frame}   {seconds(self.tick):.3f} s{missed}"

@@ -202,7 +202,7 @@ def _differences_table(compared: Sequence[MetricDifference], first: str, second:
 
 
 def _sentence(difference: MetricDifference) -> str:
-    """What has got worse, by how much, and with which interval."""
+    """A sentence that names the metric that got worse, by how much, and its interval."""
     means = f"from {_number(difference.first)} to {_number(difference.second)}"
     interval = f" (95 % interval {_interval(difference.interval)})" if difference.interval is not None else ""
     of = f"{amount(difference.pairs, 'pair')} of {amount(difference.seeds, 'seed')}"

@@ -60,7 +60,7 @@ def _kinds(struct: type) -> Iterator[tuple[str, type]]:
 
 
 class _Run:
-    """What the columns of one run are made from."""
+    """The source of the columns of one run."""
 
     def __init__(self, summary: Summary, tracks: Tracks) -> None:
         self.summary = summary
@@ -80,7 +80,7 @@ class _Run:
 
 
 def _at(*way: str) -> Callable[[_Run], Any]:
-    """What stands there: None where a struct on the way is."""
+    """Reads a field through structs: None where a struct on the way is None."""
     return lambda run: reduce(lambda value, part: value and getattr(value, part), way, run)
 
 

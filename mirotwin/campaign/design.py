@@ -34,7 +34,7 @@ def _key(key: str) -> str:
 
 
 Value = float | int | bool | str
-"""What a column of the results can hold."""
+"""A value that a column of the results can hold."""
 
 
 def kind_of(values: Iterable[Value]) -> type:
@@ -63,7 +63,7 @@ class Level(msgspec.Struct, frozen=True):
 
 
 class Factor(msgspec.Struct, frozen=True):
-    """What is varied, and its levels."""
+    """A factor that is varied, and its levels."""
 
     name: str
     levels: tuple[Level, ...]
@@ -105,7 +105,7 @@ class Draw(msgspec.Struct, frozen=True):
 
 
 class DesignPoint(msgspec.Struct, frozen=True):
-    """What one run has: the level of each factor, the values drawn, the number of the draw, and the seed."""
+    """One run: the level of each factor, the values drawn, the number of the draw, and the seed."""
 
     levels: tuple[Level, ...]
     drawn: tuple[Value, ...]
@@ -132,11 +132,11 @@ class Design(msgspec.Struct, frozen=True):
 
     @property
     def names(self) -> list[str]:
-        """What is varied, in the order of the columns."""
+        """The names of the factors and draws, in the order of the columns."""
         return [*(factor.name for factor in self.factors), *(draw.name for draw in self.draws)]
 
     def point(self, run: int) -> DesignPoint:
-        """What run number `run` has, from 0."""
+        """The design point of run number `run`, from 0."""
         rest, seed = divmod(run, self.seed_count)
         rest, draw = divmod(rest, self.draw_count)
         levels: list[Level] = []
@@ -147,7 +147,7 @@ class Design(msgspec.Struct, frozen=True):
         return DesignPoint(tuple(reversed(levels)), drawn, draw, self.first_seed + seed)
 
     def settings(self, point: DesignPoint) -> tuple[str, ...]:
-        """What a point sets, in the order of the file."""
+        """The settings of a point, in the order of the file."""
         settings = [setting for level in point.levels for setting in level.settings]
         settings += [draw.setting(value) for draw, value in zip(self.draws, point.drawn, strict=True)]
         return tuple(settings)

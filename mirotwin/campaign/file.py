@@ -79,7 +79,7 @@ def parse(text: str, path: str | Path, settings: Sequence[str] = ()) -> Plan:
 
 
 def _parsed(text: str, path: Path) -> Plan:
-    """What the text says, with paths relative to where it stands."""
+    """Reads the text of a campaign's file, with paths relative to the file."""
     with BadInput.at(path):
         raw = tables(text)
         check_numbers(raw)

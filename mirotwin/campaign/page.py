@@ -163,7 +163,7 @@ def _data(rows: ResultRows) -> bytes:
 
 
 def _drawn_words(drawn: dict[str, list[Any]], row: int) -> str:
-    """What was drawn for a row, as words of that command."""
+    """The values drawn for a row, as words of that command."""
     settings = [f"{name}={inline(column[row])}" for name, column in drawn.items()]
     return shlex.join(word for setting in settings for word in ("--set", setting))
 

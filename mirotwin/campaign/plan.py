@@ -41,7 +41,7 @@ class Head(msgspec.Struct, frozen=True):
     runs: int
 
     def difference(self, other: Head) -> str:
-        """What another campaign has else; "" where it is the same."""
+        """The difference to another campaign in words; "" where there is none."""
         if self.mirotwin_campaign != other.mirotwin_campaign:
             return f"form {other.mirotwin_campaign} of such files instead of {self.mirotwin_campaign}"
         return self.versions.difference(other.versions) or (
@@ -75,7 +75,7 @@ class Plan(msgspec.Struct, frozen=True):
 
     @property
     def hash(self) -> str:
-        """What two campaigns with the same rows have in common, but for the versions."""
+        """The hash of everything that decides the campaign's rows, but for the versions."""
         design = self.design
         content = (
             self.scenarios[self.scenario],
@@ -215,7 +215,7 @@ def _named(plan: Plan, default: str, kind: str) -> Iterator[tuple[str, str]]:
 
 
 def _places(plan: Plan, point: DesignPoint) -> dict[str, str]:
-    """What says each setting of a run: a place in the campaign's file, or an option."""
+    """The origin of each setting of a run: a place in the campaign's file, or an option."""
     places = dict(plan.settings)
     places |= {setting: level.place for level in point.levels for setting in level.settings}
     for draw, value in zip(plan.design.draws, point.drawn, strict=True):

@@ -43,7 +43,7 @@ OPTION = "--out"
 
 
 class ResultsInfo(msgspec.Struct, frozen=True):
-    """What a results file says of itself. `factors`: columns of the design, `drawn`: those of its random part.
+    """The head of a results file. `factors`: columns of the design, `drawn`: columns of its random part.
 
     What makes a row again, by names without folders: `scenario`, `firmware`, `settings` of all runs, and the `levels`
     of each factor. Files of earlier versions do not have it.
@@ -125,7 +125,7 @@ def write(plan: Plan, journal: Path, results: Path) -> None:
 
 
 def read(path: str | Path) -> tuple[pa.Table, ResultsInfo]:
-    """The rows of a results file, and what it says of itself. Raises BadInput for any other file."""
+    """The rows of a results file, and its head. Raises BadInput for any other file."""
     with _opened(path) as (file, about):
         table = file.read()
     _check_columns(path, table, about)
@@ -133,7 +133,7 @@ def read(path: str | Path) -> tuple[pa.Table, ResultsInfo]:
 
 
 def read_about(path: str | Path) -> ResultsInfo:
-    """Only what the file says of itself. Raises BadInput for any other file."""
+    """Only the head of the file. Raises BadInput for any other file."""
     with _opened(path, "choose another file with --out") as (_, about):
         return about
 
@@ -174,7 +174,7 @@ def _check_size(path: str | Path, metadata: Any) -> None:
 
 
 def _check_columns(path: str | Path, table: pa.Table, about: ResultsInfo) -> None:
-    """What statistics rely on: a seed in each row, and each factor once, with values that can be compared."""
+    """Checks that each row has a seed, and that each factor is there once, with values that can be compared."""
     named = (*about.factors, *about.drawn)
     if len(set(named)) < len(named) or set(named) & OWN_COLUMNS:
         raise BadInput(path, "", "names a factor twice, or one that does not exist", GIVE)
@@ -191,7 +191,7 @@ def _check_columns(path: str | Path, table: pa.Table, about: ResultsInfo) -> Non
 
 
 def counted(path: Path, listed: int) -> dict[str, tuple[int, list[tuple[int, str]]]]:
-    """Verdict -> how many runs have it, and the first ones: number, and what the row says of it."""
+    """Verdict -> how many runs have it, and the first ones: number, and the row's text."""
     counts: dict[str, tuple[int, list[tuple[int, str]]]] = {}
     with _opened(path) as (file, _):
         for batch in file.iter_batches(columns=["run", "verdict", "error", "failure"]):

@@ -148,7 +148,7 @@ class ResultRows:
             yield arm, {name: columns[name][of] for name, of in there.items()}
 
     def keys(self, without: str = "") -> list[Hashable]:
-        """What each row has in common with that of the same run elsewhere: all that is varied, and the seed."""
+        """A key for each row by which runs of two campaigns are paired: all that is varied, and the seed."""
         names = sorted(name for name in self.varied if name != without)
         columns = [self.column(name) for name in (*names, "seed")]
         return list(zip(*columns, strict=True))

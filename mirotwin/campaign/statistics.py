@@ -33,7 +33,7 @@ STREAM = "campaign bootstrap"
 """Of seed 0."""
 QUANTILES = (0.0, 0.05, 0.25, 0.5, 0.75, 0.95, 1.0)
 FEWEST = 8
-"""Seeds below which an interval says nothing."""
+"""Least number of seeds for an interval."""
 _STUDENT = (1.589534, 2.55585, 2.822499, 2.372271, 1.959964)
 """Factors of 1/n^4 to 1 in the 97.5 % quantile of Student's t with n degrees of freedom."""
 
@@ -46,7 +46,7 @@ class Interval(msgspec.Struct, frozen=True):
 
 
 class Figures(msgspec.Struct, frozen=True):
-    """What `count` numbers of `seeds` seeds amount to. `quantiles`: share -> value, as `quantile`.
+    """Statistics of `count` numbers of `seeds` seeds. `quantiles`: share -> value, as `quantile`.
 
     Intervals are None for fewer than 8 seeds.
     """

@@ -30,7 +30,7 @@ class Versions(msgspec.Struct, frozen=True):
     parts: tuple[str, ...] = ()
 
     def difference(self, other: Versions) -> str:
-        """What another one has else than this, in words; "" where nothing differs."""
+        """The difference of `other` to this in words; "" where nothing differs."""
         if self.mirotwin != other.mirotwin:
             return f"mirotwin {other.mirotwin} instead of {self.mirotwin}"
         if self.code != other.code:

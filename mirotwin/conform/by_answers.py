@@ -1,4 +1,4 @@
-"""The rules that answers can show, tried on a robot at a port: what a PC can send and hear, and nothing else.
+"""The rules that answers can show, tried on a robot at a port: what a PC can send and receive, and nothing else.
 
 A rule is seen in what the robot answers, and in how many frames it has accepted by the end of the trial. What a PC
 cannot send is left out of a trial, where that changes nothing else: bad stop bits, and pauses within a frame that are
@@ -85,7 +85,7 @@ class PortScript(TrialScript):
 
 
 def try_at_port(rules: Sequence[Rule], desk: DeskOptions, note: Note) -> Iterator[Outcome]:
-    """Each as soon as it is known. `note`: gets what else to say. Raises BadInput where no robot answers, PortError."""
+    """Outcomes, each as soon as it is known. `note` gets notes. Raises BadInput where no robot answers, PortError."""
     with RobotPort(desk, trial_of(rules[0]).scenario, note=note) as port:
         topology = Topology(port.greet(ROBOT_COUNTS), port.slots[:1])
         if len(port.slots) > 1:
@@ -122,7 +122,7 @@ def _try_often(rule: Rule, port: RobotPort, topology: Topology) -> Outcome:
 
 
 def _try(rule: Rule, port: RobotPort, topology: Topology) -> tuple[Failure | None, int]:
-    """What is wrong, and how well the times of the trial are known."""
+    """The failure, if any, and how well the times of the trial are known."""
     slot = topology.slots[0]
     script = PortScript(topology, standing=not port.guard.desk.allow_motion)
     rule.write(script)
@@ -132,13 +132,13 @@ def _try(rule: Rule, port: RobotPort, topology: Topology) -> tuple[Failure | Non
     @script.expects(last.end_tick, f"{amount(fresh, 'frame')} accepted by {last.what}", by_answers=True)
     def counted(observed: Observed) -> Found:
         answers = [one.content for one in observed.answers if one.frame.seq == last.seq and one.content]
-        found = f"{answers[-1].accepted}" if answers else "no answer"
-        if found != f"{fresh}":
-            yield observed.end_tick, found
+        accepted = f"{answers[-1].accepted}" if answers else "no answer"
+        if accepted != f"{fresh}":
+            yield observed.end_tick, accepted
 
     sent = _whole(script.sent)
     port.greet((script.n,), sent)
-    # from here on: what greeting took says nothing of the trial
+    # from here on: delays of the greeting do not count
     cursor, begun = Cursor(port.log), len(port.late_ticks)
     observed = Observed(script.n, slot)
 
@@ -158,15 +158,15 @@ def _try(rule: Rule, port: RobotPort, topology: Topology) -> tuple[Failure | Non
     gather(port.tick)
     unsure = max(*port.late_ticks[begun:], max(port.delays) - shortest)
 
-    for one in script.expected:  # the effects of power-on are reported by now
-        if one.by_answers and slot in one.slots and "of power-on" not in one.wanted:
-            if (what := one.found(observed)) is not None:
-                return Failure("conforms_to", 0, slot, what[0], one.wanted, what[1]), unsure
+    for expectation in script.expected:  # the effects of power-on are reported by now
+        if expectation.by_answers and slot in expectation.slots and "of power-on" not in expectation.wanted:
+            if (failure := expectation.found(observed)) is not None:
+                return Failure("conforms_to", 0, slot, failure[0], expectation.wanted, failure[1]), unsure
     return None, unsure
 
 
 def _in_turn_of_another(frame: Received, topology: Topology, there: Sequence[int]) -> bool:
-    """Whether another robot at the port may say this."""
+    """Whether another robot at the port may send this."""
     answer = answer_of(frame)
     others = (slot for slot in there if slot not in topology.slots)
     return answer is not None and answer.slot in others and answer.slot == answer.seq % topology.robots

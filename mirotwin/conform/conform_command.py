@@ -40,7 +40,7 @@ from mirotwin.verify.cases.case import write_case
 LINES = 5
 """Firmware faults that are listed."""
 _OF_TRIALS = ("image", "everything", "junit", "artifacts", "seed", "stack_from", "port")
-"""Options that say nothing to a list of the rules."""
+"""Options that have no effect on a list of the rules."""
 
 
 class ConformOptions(Options, frozen=True, kw_only=True):

@@ -28,7 +28,7 @@ _STT = BY_NAME["STT"].opcode
 
 
 def explain(rule: Rule, image: Image, seed: int = 0) -> tuple[list[str], int, int]:
-    """Runs the trial and tells what happened in it, robot by robot.
+    """Runs the trial and lists its events, robot by robot.
 
     With the lines, how many of the rule's expectations failed, and how many faults the firmware had.
     """
@@ -119,7 +119,7 @@ def _characters(run: Sequence[Event]) -> str:
 
 
 def _answer(run: Sequence[Event], observed: Observed) -> str:
-    """What the characters say, if they are an answer."""
+    """The content of the characters, if they are an answer."""
     for answer in within(observed.answers, run[0].tick, run[-1].tick):
         content = answer.content
         if content is None:

@@ -52,8 +52,8 @@ def wheels_instead(orders: Sequence[Order], frame: Frame, slot: int) -> str:
         return ""
     for mistake, pair in _mistakes(frame, slot):
         # firmware may cut off before or after its mistake
-        for one, other in (pair, (saturated(pair[0]), saturated(pair[1]))):
-            if (one << 8, other << 8) == velocities:
+        for left_word, right_word in (pair, (saturated(pair[0]), saturated(pair[1]))):
+            if (left_word << 8, right_word << 8) == velocities:
                 return mistake
     for shift in _SHIFTS:
         if velocities == (wanted[0] << shift, wanted[1] << shift):
@@ -99,7 +99,7 @@ def _mistakes(frame: Frame, slot: int) -> Iterator[tuple[str, Pair]]:
 
 
 def _wrong_way(word: int) -> int:
-    """What 16 bits make of it that take backward for forward before they take the magnitude."""
+    """The result in 16 bits of code that mistakes backward for forward before it takes the magnitude."""
     return -(-word & 0xFFFF) if word > 0 else word & 0xFFFF
 
 

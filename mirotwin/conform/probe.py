@@ -45,7 +45,7 @@ _UNHEARD = 4
 
 
 def why_deaf(network: int, image: Image, seed: int) -> str:
-    """What the robot in this one of `BOTH` does instead of obeying plain frames, or ""."""
+    """How the robot in this topology of `BOTH` reacts instead of obeying plain frames, or ""."""
     topology = BOTH[network]
     tried: list[tuple[str, Frame]] = []
 

@@ -45,7 +45,7 @@ class ConformsTo(Check, frozen=True, kw_only=True, tag="conforms_to"):
 
 
 class ObservingMonitor(Monitor[C_co]):
-    """Keeps all of one robot and its host that rules and timelines ask about."""
+    """Records all of one robot and its host that rules and timelines need."""
 
     EVENTS: tuple[str, ...] = ("sent", "received", "frame", "command", "heard", "answer", "reset", "power")
 

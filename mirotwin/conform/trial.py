@@ -49,11 +49,11 @@ class Trial:
     expected: tuple[tuple[TrialExpectation, ...], ...]
 
     def transmissions_of(self, network: int) -> list[Transmission]:
-        """What the host of a network says."""
+        """The transmissions of a network's host."""
         return [one for one in self.script if isinstance(one, Transmission) and one.network == network]
 
     def expected_of(self, subject: Subject) -> list[TrialExpectation]:
-        """What is expected of a robot."""
+        """The expectations of a robot."""
         return [one for one in self.expected[subject.network] if subject.slot in one.slots]
 
 

@@ -54,10 +54,10 @@ GAP_MS = ACTING_MS + 2.0
 """From the end of a frame to the start of the next, unless a rule says otherwise: time to act."""
 Pairs = tuple[tuple[int, int], ...]
 Found = Iterator[tuple[int, str]]
-"""What is wrong: since which tick, and what was found instead. The first one counts."""
+"""Failures of an expectation: since which tick, and what was found instead. The first one counts."""
 Test = Callable[[Observed], Found]
 Says = Callable[[TelemetryFrame, ReceivedAnswer, Observed], str]
-"""What is wrong with what an answer says, or ""."""
+"""The error in an answer's content, or ""."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -100,7 +100,7 @@ class TrialExpectation:
     by_answers: bool
 
     def found(self, observed: Observed) -> tuple[int, str] | None:
-        """What is wrong, None for nothing."""
+        """The first failure, or None."""
         return next(self.test(observed), None)
 
 
@@ -335,7 +335,7 @@ class TrialScript:
 
 
 def _instead(observed: Observed, frame: Frame, orders: tuple[Order, Order]) -> str:
-    """What the robot made of the frame, where that is plain; else ""."""
+    """How the robot reacted to the frame, where that is plain; else ""."""
     if max(order.tick for order in orders) <= frame.tick:
         late = _obeyed_late(observed, frame)
         if late is not None:

@@ -105,7 +105,7 @@ class BoardTarget(Target):
         return self.code
 
     def _judged(self) -> Failure | None:
-        """What the checks say. That one raises is a failure too: the error comes when the crash is confirmed."""
+        """The failure of a check. A check that raises has failed, too: its error comes when the crash is confirmed."""
         tick = self.end_tick()
         for check in self.checks:
             try:

@@ -179,7 +179,7 @@ class Campaign:
             self.reached_by = self.triage.leave("covering", self.covering.name, data, stream, counts)
 
     def _judge(self, data: bytes) -> None:
-        """What the checks in Python say of it. Raises PluginError where one raises."""
+        """Judges an input by the checks in Python. Raises PluginError where one raises."""
         began_s = time.monotonic()
         try:
             self.judged += 1

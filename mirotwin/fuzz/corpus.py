@@ -35,7 +35,7 @@ MOST = 2000
 
 
 def read_corpus(folder: Path, kind: str, robots: int) -> tuple[list[bytes], list[str]]:
-    """The inputs of that kind in a folder, no two the same, and what a user should hear about files that are none.
+    """The inputs of that kind in a folder, no two the same, and notes for the user about files that are none.
 
     Raises BadInput where there are none.
     """
@@ -78,7 +78,7 @@ def _files(folder: Path) -> Iterator[Path]:
 
 
 def _inputs_in(path: Path, kind: str, robots: int) -> list[bytes]:
-    """What a file says as inputs; none for a file of another kind."""
+    """The content of a file as inputs; none for a file of another kind."""
     with Input(str(path)) as given:
         format, _ = detect(given.peek())
         if format in TIMED:

@@ -75,7 +75,7 @@ def read_executions(path: Path) -> int:
 
 
 class Explorer:
-    """Runs inputs and tells `keep(kind, data)` which to keep: "queue" for new edges, "crashes" for a new failure.
+    """Runs inputs and calls `keep(kind, data)` for new ones: "queue" for new edges, "crashes" for a new failure.
 
     How often an edge was executed counts by AFL++'s classes: 1, 2, 3, 4 to 7, 8 to 15, .. times. Failures are new by
     check and place.
@@ -250,7 +250,7 @@ class Engine:
 
 
 def _content(path: Path) -> bytes:
-    """What is at `path`; empty while it is written, or where afl-fuzz writes a shorter input in its place."""
+    """The content of `path`; empty while it is written, or where afl-fuzz writes a shorter input in its place."""
     try:
         return path.read_bytes()
     except OSError:

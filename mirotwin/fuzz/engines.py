@@ -30,7 +30,7 @@ def engine_for(
     jobs: int,
     seed: int | None,
 ) -> tuple[Engine, list[str]]:
-    """AFL++, or Hypothesis, with what a user should hear about it. Raises BadInput for what cannot be."""
+    """AFL++, or Hypothesis, with a note for the user about it. Raises BadInput where neither can run."""
     seeds, dictionary = folder.folder("seeds"), folder.path / "dictionary"
     write_seeds(seeds, inputs)
     if spec.board == "bare":

@@ -31,7 +31,7 @@ from mirotwin.shell.processes import end_with_parent, python_module
 ROUND_EXAMPLES = 500
 """Inputs between two times that Hypothesis forgets: it has then climbed once."""
 TOLD_S = 0.25
-"""Between two times that it tells how far it is."""
+"""Seconds between two progress reports."""
 
 
 class HypothesisRun(Engine):

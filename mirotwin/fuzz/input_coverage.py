@@ -30,7 +30,7 @@ class InputCoverage:
         self.total = counts_of(booting)
 
     def run(self, data: bytes) -> Counts:
-        """What runs because of `data`; it counts in the total."""
+        """The coverage of `data`, which also counts in the total."""
         counts = self._counts(data)
         self.total = merged((self.total, counts))
         return counts

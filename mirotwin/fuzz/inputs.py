@@ -52,7 +52,7 @@ def inputs_of(kind: str, happened: Iterable[ScriptItem], robots: int) -> list[by
 
 
 def input_of(kind: str, items: Sequence[ScriptItem], robots: int) -> bytes:
-    """One input of that kind; empty where there is nothing that it could say."""
+    """One input of that kind; empty where it could hold nothing."""
     if kind == "bytes":
         return b"".join(item.data for item in items if isinstance(item, Transmission))
     data = bytearray()

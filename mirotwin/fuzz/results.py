@@ -62,7 +62,7 @@ class Results:
             yield f"{', '.join(campaign.expected)}: judged {amount(campaign.judged or 'no', 'input')}"
 
     def notes(self) -> Iterator[str]:
-        """What is not as one would wish."""
+        """Warnings: inputs not looked at, failures that did not repeat, functions and checks that were not reached."""
         campaign, triage = self.campaign, self.triage
         if self.left:
             inputs = amount(self.left, "input of the engine was", "inputs of the engine were")

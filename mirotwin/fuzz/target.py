@@ -30,7 +30,7 @@ NEVER_SLEEPS_CODE = len(NAMES)
 
 
 class TargetFailure(msgspec.Struct, frozen=True):
-    """What was wrong in a run. `pc`: address of the instruction that did it, 0 where none is known."""
+    """The failure of a run. `pc`: address of the instruction that did it, 0 where none is known."""
 
     check: str
     tick: int
@@ -89,7 +89,7 @@ class Target(ABC):
         return self.harness.now_tick
 
     def script(self, data: bytes) -> list[ScriptItem]:
-        """What the processor hears of an input, and its resets, at ticks since power-on."""
+        """The characters that the processor receives of an input, and its resets, at ticks since power-on."""
         program = self.program
         program.read(data)
         items: list[ScriptItem] = []
@@ -125,7 +125,7 @@ class Target(ABC):
         return [Reset(begin_tick, 0, self.slot, 1), Reset(begin_tick + RESET_TICKS, 0, self.slot, 0)]
 
     def describe(self, data: bytes) -> str:
-        """An input as lines, one for each piece of what the processor hears."""
+        """An input as lines, one for each piece that the processor receives."""
         return "\n".join(described(one) for one in self.script(data))
 
 

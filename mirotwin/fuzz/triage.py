@@ -154,15 +154,15 @@ class Triage:
             self._count(known, group)
             return None
         small = minimise(data, fails, tries, self.minimise_s, self.tell)
-        verdict, what = judged(small)
+        verdict, reason = judged(small)
         if verdict.failure is None and small != data:
             whole, message = judged(data)
             if whole.failure is not None:  # smaller, it is only the target's
-                small, verdict, what = data, whole, message
-        key = self._key(group, small, verdict, what)
+                small, verdict, reason = data, whole, message
+        key = self._key(group, small, verdict, reason)
         known = self._by_name.get(key.name)
         if known is None and group[1] is None:  # unconfirmed ones differ by the target's message
-            known = self._by_name.pop(self._key(group, small, None, what).name, None)
+            known = self._by_name.pop(self._key(group, small, None, reason).name, None)
         if known is not None:
             self._count(known, group)
             if known.confirmed or verdict.failure is None:
@@ -170,7 +170,7 @@ class Triage:
             self.found.remove(known)  # another input shows now that it is real
             self.folder.remove(known.folder, known.name)
             self.more[key.name] = self.more.pop(known.name)
-        crash = self._keep(key, small, what, verdict, (len(data), len(small)))
+        crash = self._keep(key, small, reason, verdict, (len(data), len(small)))
         self._last[group] = crash
         self._in_vain[group] = 0
         return crash
@@ -180,18 +180,18 @@ class Triage:
         self._in_vain[group] += 1
         self._last[group] = known
 
-    def _key(self, group: tuple[str, int | None], data: bytes, verdict: Run | None, what: str) -> CrashKey:
+    def _key(self, group: tuple[str, int | None], data: bytes, verdict: Run | None, reason: str) -> CrashKey:
         """The key of the crash that an input shows. A fault needs no verdict for that."""
         check, pc = group
         if pc is not None:
             return CrashKey(check, self.reached.cause(data, pc), "")
         failure = None if verdict is None else verdict.failure
-        return CrashKey(check, None, _NUMBER.sub("#", what if failure is None else failure.found))
+        return CrashKey(check, None, _NUMBER.sub("#", reason if failure is None else failure.found))
 
     def _failure(self, data: bytes) -> TargetFailure | None:
         return self.target.failure if self.target.run(data) else None
 
-    def _keep(self, key: CrashKey, data: bytes, what: str, verdict: Run, sizes: tuple[int, int]) -> Crash:
+    def _keep(self, key: CrashKey, data: bytes, reason: str, verdict: Run, sizes: tuple[int, int]) -> Crash:
         failure, cause = verdict.failure, key.cause
         crash = Crash(
             name=key.name,
@@ -199,7 +199,7 @@ class Triage:
             pc=None if cause is None else cause.pc,
             cause="" if cause is None else cause.what,
             function="" if cause is None else self.reached.function(cause.pc),
-            verdict=f"{key.check}: {what}" if failure is None else str(failure),
+            verdict=f"{key.check}: {reason}" if failure is None else str(failure),
             folder=UNCONFIRMED if failure is None else CONFIRMED,
             sizes=sizes,
             fault=failure is not None and failure.fault,
@@ -246,13 +246,13 @@ def minimise(
     """
     end_s = time.monotonic() + time_s
 
-    def attempt(one: bytes) -> bool:
+    def attempt(shorter: bytes) -> bool:
         nonlocal tries
         if tries <= 0 or time.monotonic() >= end_s:
             return False
         tries -= 1
         tell()
-        return still(one)
+        return still(shorter)
 
     before = None if attempt(data) else data
     while data != before:
@@ -263,7 +263,7 @@ def minimise(
 
 
 def _simpler(data: bytes, attempt: Question, instead: Callable[[bytes], bytes]) -> bytes:
-    """What is put in the place of chunks, from the end on: what comes after the crash goes first."""
+    """Replaces chunks, from the end on, so that what comes after the crash goes first."""
     size = max(1, len(data) // 2)
     while size:
         end = len(data)

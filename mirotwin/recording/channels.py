@@ -33,7 +33,7 @@ _TOPIC = re.compile(rf"/net([0-9]{{1,9}})(?:/robot([0-9]{{1,9}}))?/([a-z0-9_]+|{
 
 
 class Topic(NamedTuple):
-    """What a topic names. `network`, `slot`: -1 where it is of the world, or of a whole network."""
+    """The parts of a topic. `network`, `slot`: -1 where it is of the world, or of a whole network."""
 
     channel: str
     network: int = -1
@@ -46,7 +46,7 @@ def topic_name(channel: str, network: int, slot: int = -1) -> str:
 
 
 def topic_of(topic: str) -> Topic | None:
-    """What `topic` names; None if it has not the form of one of ours."""
+    """The parts of `topic`; None if it has not the form of one of ours."""
     if topic == PERIOD:
         return Topic(PERIOD)
     match = _TOPIC.fullmatch(topic)
@@ -298,7 +298,7 @@ def message_type(topic: Topic) -> type[msgspec.Struct] | None:
 
 
 def action_message(action: Action) -> ActionMessage:
-    """What was done, as a message."""
+    """The message about an action."""
     if isinstance(action, RadioState):
         return ActionMessage(action.tick, -1, action.state)
     if isinstance(action, Reset):
@@ -307,7 +307,7 @@ def action_message(action: Action) -> ActionMessage:
 
 
 def action(network: int, message: ActionMessage) -> Action:
-    """What a message about an action says. Raises ValueError when it cannot be."""
+    """The action of a message. Raises ValueError for a message that cannot be."""
     if not 0 <= message.tick <= MAX_TICK or message.slot < -1:
         raise ValueError(f"{message.what} of robot {message.slot} at tick {message.tick}")
     if message.what == "reset":
@@ -318,7 +318,7 @@ def action(network: int, message: ActionMessage) -> Action:
 
 
 def transmission(network: int, message: WireMessage) -> Transmission:
-    """What a wire message says. Raises ValueError when it cannot be."""
+    """The transmission of a wire message. Raises ValueError for a message that cannot be."""
     data = bytes.fromhex(message.data)
     if not 0 <= message.tick <= MAX_TICK or message.direction not in DIRECTIONS or not data:
         raise ValueError(f"{len(data)} characters {message.direction!r} at tick {message.tick}")
@@ -401,7 +401,7 @@ def _resolved(node: Any, parts: dict[str, Any]) -> Any:
 
 
 def schema_name(kind: type[msgspec.Struct]) -> str:
-    """What the schema of messages of a kind is called."""
+    """The name of the schema of messages of a kind."""
     if kind is ImageMessage:
         return IMAGE_SCHEMA_NAME
     return f"mirotwin.{kind.__name__.removesuffix('Message')}"

@@ -37,7 +37,7 @@ _VELOCITY_UNIT = 65536.0
 
 
 class CompareRule(msgspec.Struct, frozen=True):
-    """What counts as a difference. Differences at ticks from `from_tick` to before `to_tick` (None: the end) count.
+    """The rule of a comparison. Differences at ticks from `from_tick` to before `to_tick` (None: the end) count.
 
     `within_ticks`: of bytes and commands; `within_counts`, `within_counts_per_sample`: of wheels. `host`: also what the
     PCs did, `digests`: also the digests of the states (both of bits only). `clock`: ticks a second;
@@ -76,27 +76,27 @@ def differences(
     periods = min(len(recorded), len(replayed))
     if not periods:
         return []
-    one, other = recorded[:periods], replayed[:periods]
-    ordered = sorted(_all(one, other, rule), key=attrgetter("tick"))
+    first, second = recorded[:periods], replayed[:periods]
+    ordered = sorted(_all(first, second, rule), key=attrgetter("tick"))
     to_tick = NEVER_TICK if rule.to_tick is None else rule.to_tick
     return [difference for difference in ordered if rule.from_tick <= difference.tick < to_tick]
 
 
-def _all(one: Sequence[Period], other: Sequence[Period], rule: CompareRule) -> Iterator[Difference]:
+def _all(run: Sequence[Period], other: Sequence[Period], rule: CompareRule) -> Iterator[Difference]:
     """Causes before effects: at one tick the first is reported first."""
     if rule.kind in ("bits", "commands"):
-        yield from _commands(one, other, rule)
+        yield from _commands(run, other, rule)
     if rule.kind in ("bits", "bytes"):
-        yield from _air(one, other, rule)
+        yield from _air(run, other, rule)
     if rule.kind in ("bits", "wheels"):
-        for here, there in zip(one, other, strict=True):
+        for here, there in zip(run, other, strict=True):
             for robot, twin in zip(here.robots, there.robots, strict=True):
                 compare = _wheels(robot, twin, rule) if rule.kind == "wheels" else _values(robot, twin, rule)
                 for name, recorded, replayed in compare:
                     place = here.tick, here.index, robot.network, robot.slot
                     yield Difference(*place, name, recorded, replayed)
     if rule.digests and rule.kind == "bits":
-        for here, there in zip(one, other, strict=True):
+        for here, there in zip(run, other, strict=True):
             if here.digest != there.digest:
                 end_tick = here.tick + rule.period_ticks
                 yield Difference(end_tick, here.index, -1, -1, DIGEST, here.digest, there.digest)
@@ -134,49 +134,51 @@ def _wheels(robot: RobotPeriod, twin: RobotPeriod, rule: CompareRule) -> Named:
             yield f"lm629 {side} desired_velocity", velocity, twins
 
 
-def _commands(one: Sequence[Period], other: Sequence[Period], rule: CompareRule) -> Iterator[Difference]:
+def _commands(
+    recorded: Sequence[Period], replayed: Sequence[Period], rule: CompareRule
+) -> Iterator[Difference]:
     """Commands are known up to the last exposure: one that comes later in one run may not have been recorded."""
     exact = rule.kind == "bits"
     within_ticks = 0 if exact else rule.within_ticks
-    known_tick = NEVER_TICK if exact else one[-1].tick - within_ticks
-    for index, robot in enumerate(one[0].robots):
+    known_tick = NEVER_TICK if exact else recorded[-1].tick - within_ticks
+    for index, robot in enumerate(recorded[0].robots):
         for side in ("left", "right"):
-            here, there = (sequences.commands(run, index, side, exact) for run in (one, other))
+            here, there = (sequences.commands(run, index, side, exact) for run in (recorded, replayed))
             place = robot.network, robot.slot, f"lm629 {side} command"
             yield from _unlike(here, there, within_ticks, known_tick, place, rule.period_ticks)
 
 
-def _air(one: Sequence[Period], other: Sequence[Period], rule: CompareRule) -> Iterator[Difference]:
+def _air(recorded: Sequence[Period], replayed: Sequence[Period], rule: CompareRule) -> Iterator[Difference]:
     """Characters are known once their stop bits were sampled."""
     within_ticks = rule.within_ticks if rule.kind == "bytes" else 0
-    end_tick = one[-1].tick + rule.period_ticks
-    robots = {robot.network for robot in one[0].robots}
+    end_tick = recorded[-1].tick + rule.period_ticks
+    robots = {robot.network for robot in recorded[0].robots}
     for network in sorted(robots or {0}):  # 0: the wire of a board alone
         if rule.kind == "bytes":
             known_tick = end_tick - within_ticks - HOST_CHARACTER_TICKS
-            here, there = sequences.characters(one, network), sequences.characters(other, network)
+            here, there = sequences.characters(recorded, network), sequences.characters(replayed, network)
             yield from _unlike(
                 here, there, within_ticks, known_tick, (network, -1, "wire"), rule.period_ticks
             )
             continue
         for name, sent in (("wire", False), *([("wire sent", True)] if rule.host else [])):
-            here = sequences.transmissions(one, network, sent)
-            there = sequences.transmissions(other, network, sent)
+            here = sequences.transmissions(recorded, network, sent)
+            there = sequences.transmissions(replayed, network, sent)
             yield from _unlike(here, there, 0, NEVER_TICK, (network, -1, name), rule.period_ticks)
         if rule.host:
-            done, there = sequences.actions(one, network), sequences.actions(other, network)
+            done, there = sequences.actions(recorded, network), sequences.actions(replayed, network)
             yield from _unlike(done, there, 0, NEVER_TICK, (network, -1, "actions"), rule.period_ticks)
 
 
 def _unlike(
-    one: Sequence[LogEntry],
-    other: Sequence[LogEntry],
+    recorded: Sequence[LogEntry],
+    replayed: Sequence[LogEntry],
     within_ticks: int,
     known_tick: int,
     place: tuple[int, int, str],
     period_ticks: int,
 ) -> Iterator[Difference]:
-    for here, there in sequences.unlike(one, other, within_ticks):
+    for here, there in sequences.unlike(recorded, replayed, within_ticks):
         tick = min(each.tick for each in (here, there) if each is not None)
         if tick < known_tick or (here is not None and there is not None):
             texts = (None if here is None else str(here), None if there is None else str(there))
@@ -184,7 +186,7 @@ def _unlike(
 
 
 def _response(robot: RobotPeriod) -> NamedValues:
-    """What the robot did: its counters, LM629s, PWM and motion."""
+    """Values of the robot: its counters, LM629s, PWM and motion."""
     yield from zip(COUNTERS, (robot.accepted, robot.rejected, robot.stale), strict=True)
     for side, axis in (("left", robot.left), ("right", robot.right)):
         yield from _axis(side, axis)
@@ -194,7 +196,7 @@ def _response(robot: RobotPeriod) -> NamedValues:
 
 
 def _of_host(robot: RobotPeriod) -> NamedValues:
-    """What its PC measured and commanded, and where it should be."""
+    """Values of its PC: the measurement, the command, and the reference."""
     yield from _posture("reference", robot.reference)
     measured = robot.measurement
     yield from _posture("measurement", measured)

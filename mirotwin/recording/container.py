@@ -162,7 +162,7 @@ class Records:
 
 
 def _in(opcode: int, body: bytes, whole: bool) -> Iterator[McapRecord]:
-    """What one record of the file holds."""
+    """The content of one record of the file."""
     if opcode == Opcode.CHUNK:
         yield from _in_chunk(body, whole)
     elif whole and opcode == Opcode.MESSAGE:

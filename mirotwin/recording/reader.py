@@ -117,7 +117,7 @@ class _Collector:
 
 
 def _source(messages: Messages) -> RunSource:
-    """What the run was made from. Raises RecordingError for what is missing."""
+    """The sources of the run. Raises RecordingError for a source that is missing."""
     messages.check_ours()
     metadata, attachments = messages.metadata or {}, messages.attachments
     for name in ATTACHMENTS:

@@ -46,7 +46,7 @@ and when, if that is why."""
 
 
 class RunSource(msgspec.Struct, frozen=True):
-    """What a run was made from: scenario text, seed, firmware file, and its symbols (name -> address,
+    """The sources of a run: scenario text, seed, firmware file, and its symbols (name -> address,
     space). `state`: the form of the states that its digests are of (`Flat.tables`), "" where it is not known.
     `resumed`: the saved world that the run went on from, empty for a run from its start. `origin`: "port" where robots
     were real and what is in it is their twin's, else empty. `plugins`: those of other distributions that the scenario

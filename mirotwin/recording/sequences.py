@@ -39,7 +39,7 @@ def commands(periods: Sequence[Period], index: int, side: str, answers: bool) ->
 
 
 def transmissions(periods: Sequence[Period], network: int, sent: bool) -> list[LogEntry]:
-    """What is `on_air`."""
+    """The transmissions `on_air`."""
     return [LogEntry(one.tick, _text(one)) for one in on_air(periods, network, sent)]
 
 
@@ -61,7 +61,7 @@ def _command(opcode: int, data: str, answers: bool) -> str:
 
 
 def actions(periods: Sequence[Period], network: int) -> list[LogEntry]:
-    """What was done to a network's robots and its radio."""
+    """The actions on a network's robots and its radio."""
     logged = (action for period in periods for action in period.actions if action.network == network)
     return [LogEntry(action.tick, _action(action)) for action in logged]
 
@@ -74,7 +74,7 @@ def _action(action: Action) -> str:
 
 
 def on_air(periods: Sequence[Period], network: int, sent: bool) -> Iterator[Transmission]:
-    """What was on a network's air: `sent` by its host, or else received by the PC from its robots."""
+    """Transmissions of a network: `sent` by its host, or else received by the PC from its robots."""
     for period in periods:
         for transmission in period.wire:
             if transmission.network == network and (transmission.direction == DOWN) == sent:
@@ -86,9 +86,9 @@ def _text(transmission: Transmission) -> str:
     return f"{transmission.data.hex(' ')}{bad}"
 
 
-def unlike(one: Sequence[LogEntry], other: Sequence[LogEntry], within_ticks: int) -> Iterator[Pair]:
-    """The pairs that differ: of those that are alike, both say the same and are at most `within_ticks` apart."""
-    for here, there in pairs(one, other, within_ticks):
+def unlike(entries: Sequence[LogEntry], others: Sequence[LogEntry], within_ticks: int) -> Iterator[Pair]:
+    """The pairs that differ: entries that are alike have equal texts and are at most `within_ticks` apart."""
+    for here, there in pairs(entries, others, within_ticks):
         if (
             here is None
             or there is None
@@ -99,7 +99,7 @@ def unlike(one: Sequence[LogEntry], other: Sequence[LogEntry], within_ticks: int
 
 
 def pairs(
-    one: Sequence[LogEntry], other: Sequence[LogEntry], within_ticks: int, same_ticks: int = SAME_TICKS
+    entries: Sequence[LogEntry], others: Sequence[LogEntry], within_ticks: int, same_ticks: int = SAME_TICKS
 ) -> Iterator[Pair]:
     """All of both, in the order of time; None stands where one side has nothing.
 
@@ -107,12 +107,12 @@ def pairs(
     comparison goes on after it: what is missing on one side shifts nothing.
     """
     first = second = 0
-    while first < len(one) and second < len(other):
-        here, there = one[first], other[second]
+    while first < len(entries) and second < len(others):
+        here, there = entries[first], others[second]
         apart = abs(here.tick - there.tick)
         alike = here.text == there.text and apart <= same_ticks
         if alike and apart > within_ticks:  # unless the later one is the next on the earlier side
-            early = (one, first, there) if here.tick < there.tick else (other, second, here)
+            early = (entries, first, there) if here.tick < there.tick else (others, second, here)
             alike = not _follows(*early, within_ticks)
         if alike or apart <= within_ticks:
             yield here, there
@@ -123,12 +123,12 @@ def pairs(
         else:
             yield None, there
             second += 1
-    yield from ((here, None) for here in one[first:])
-    yield from ((None, there) for there in other[second:])
+    yield from ((here, None) for here in entries[first:])
+    yield from ((None, there) for there in others[second:])
 
 
 def _follows(entries: Sequence[LogEntry], index: int, wanted: LogEntry, within_ticks: int) -> bool:
-    """Whether one behind `index` says what `wanted` says, at its time."""
+    """Whether an entry behind `index` has the text of `wanted`, at its time."""
     for place in range(index + 1, len(entries)):
         if entries[place].tick > wanted.tick + within_ticks:
             return False

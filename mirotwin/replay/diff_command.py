@@ -203,14 +203,14 @@ def _run_images(options: DiffOptions) -> tuple[ComparedRun, ComparedRun]:
     return runs[0], runs[1]
 
 
-def _with_same_robots(one: ComparedRun, other: ComparedRun) -> tuple[ComparedRun, ComparedRun]:
+def _with_same_robots(first: ComparedRun, other: ComparedRun) -> tuple[ComparedRun, ComparedRun]:
     """Both with the robots that both have, and a note on each that has more. Raises BadInput where none is in both."""
-    here, there = _robots(one), _robots(other)
+    here, there = _robots(first), _robots(other)
     if here == there:
-        return one, other
+        return first, other
     common = [place for place in here if place in there]
     runs = []
-    for name, run, robots in ((NAMES[0], one, here), (NAMES[1], other, there)):
+    for name, run, robots in ((NAMES[0], first, here), (NAMES[1], other, there)):
         alone = [f"net{network}/robot{slot}" for network, slot in robots if (network, slot) not in common]
         notes = [*run.notes, *([f"only {name} has {', '.join(alone)}"] if alone else [])]
         runs.append(replace(run, periods=[_only(period, common) for period in run.periods], notes=notes))

@@ -143,7 +143,7 @@ def _report_case(result: Result, line: str, quiet: bool) -> int:
 
 
 def _loaded(file: str, options: ReplayOptions) -> tuple[Job, list[Image]]:
-    """What is replayed, and the images of --lines-from. Raises BadInput for options that mean nothing there."""
+    """The job to replay, and the images of --lines-from. Raises BadInput for options that mean nothing there."""
     if options.stack_from is not None and options.firmware is None:
         raise click.UsageError("--stack-from needs --firmware; a recorded image has its own.")
     keys = (*options.settings, *as_settings(options.expected))

@@ -62,7 +62,7 @@ def difference_tables(difference: RunDifference, everything: bool) -> Iterator[T
 
 
 def source_tables(origins: Sequence[SourceDifference], names: Names) -> Iterator[Table | str]:
-    """What two runs were not made alike from, and an empty line."""
+    """A table of the sources in which two runs differ, and an empty line."""
     if origins:
         table = plain_table("made from", *names)
         for origin in origins:

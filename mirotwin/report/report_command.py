@@ -195,7 +195,7 @@ def _played_with(image: Image, kind: str, recorded: Image | None = None) -> str:
 
 
 def _verdict_note(job: Job, again: WatchedRun) -> list[str]:
-    """What became of a case's verdict."""
+    """A note where the run no longer gives the case's verdict."""
     verdict = job.case.verdict
     if not verdict or verdict in map(str, again.result.failures):
         return []

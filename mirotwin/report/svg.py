@@ -26,7 +26,7 @@ PER_LABEL_X, PER_LABEL_Y = 75.0, 42.0
 LETTER = 6.6
 """Pixels of a letter of the legend, about."""
 MARGIN = 0.05
-"""What an axis spans beyond its values, as a share of their range."""
+"""The margin of an axis beyond its values, as a share of their range."""
 
 STYLE = """
 text{font:12px "DejaVu Sans",Verdana,sans-serif;fill:var(--ink)}

@@ -26,7 +26,7 @@ Expected = Annotated[tuple[str, ...], EXPECT]
 
 
 def as_settings(expected: Sequence[str], files: bool = True) -> tuple[str, ...]:
-    """What --expect was given, as settings of the scenario; a KEY alone is a check with its defaults.
+    """The values of --expect as settings of the scenario; a KEY alone is a check with its defaults.
 
     `FILE.py:CLASS` runs the file, and makes its check known by its own name until --expect is read again. Raises
     BadInput for what is no check, and where `files` are of no use.
@@ -41,7 +41,7 @@ def as_settings(expected: Sequence[str], files: bool = True) -> tuple[str, ...]:
 
 
 def table_alone(expected: Sequence[str], origin: str) -> dict[str, Any]:
-    """What --expect says of a board alone, as its table `[expect]`. Raises BadInput."""
+    """The values of --expect for a board alone, as its table `[expect]`. Raises BadInput."""
     raw: dict[str, Any] = {}
     settings = make(raw, as_settings(expected), origin)
     table: dict[str, Any] = raw.get("expect", {})

@@ -32,7 +32,7 @@ BOUND_CM = 2.40
 
 
 Judged = tuple[str, str]
-"""What was measured, and the verdict."""
+"""The measured values as text, and the verdict."""
 
 
 class ClaimResult(msgspec.Struct, frozen=True):

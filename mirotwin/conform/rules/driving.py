@@ -41,9 +41,9 @@ def both_types(script: TrialScript) -> None:
     script.wait(_ANY_BOOT_MS)
     after = ""
     for ask in (False, True, True, False):
-        what = "question" if ask else "team frame"
-        script.obeyed(script.team(ask=ask, what=what + after))
-        after = f" after a {what}"
+        name = "question" if ask else "team frame"
+        script.obeyed(script.team(ask=ask, what=name + after))
+        after = f" after a {name}"
 
 
 @CHAPTER.rule("P25", FRAME, presupposes="P19")
@@ -97,8 +97,8 @@ def one_sample(script: TrialScript) -> None:
     _together(script, end + ms(450.0), end + ms(510.0), "motors off")
 
 
-def _together(script: TrialScript, after_tick: int, until_tick: int, what: str) -> None:
-    @script.expects(until_tick, f"{what}: STT of both wheels in one sample")
+def _together(script: TrialScript, after_tick: int, until_tick: int, name: str) -> None:
+    @script.expects(until_tick, f"{name}: STT of both wheels in one sample")
     def test(observed: Observed) -> Found:
         left, right = observed.both_orders(until_tick)
         if min(left.tick, right.tick) <= after_tick:

@@ -179,14 +179,14 @@ def off_behind(script: TrialScript, last: Frame) -> None:
     _in_time(script, last, FAILSAFE_OFF_TICKS, "off", "both motors off")
 
 
-def _in_time(script: TrialScript, last: Frame, after_ticks: int, what: str, wanted: str) -> None:
+def _in_time(script: TrialScript, last: Frame, after_ticks: int, order_kind: str, wanted: str) -> None:
     rule = SilenceRule(after_ticks)
     rule.last_tick = last.last_tick
     earliest, latest = rule.earliest_tick(), rule.latest_tick()
 
     def done(observed: Observed, side: str, tick: int) -> bool:
         order = observed.last_order(side, tick)
-        return order.what == "off" if what == "off" else not order.moves
+        return order.what == "off" if order_kind == "off" else not order.moves
 
     def when(observed: Observed, side: str) -> str:
         after = [order.tick for order in observed.orders[side] if order.tick > last.end_tick]

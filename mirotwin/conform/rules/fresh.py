@@ -47,8 +47,8 @@ def again(script: TrialScript) -> None:
             if after_ms < 200.0:  # a frame that is not fresh must not count here
                 script.team(step=0, lead=b"", fresh=False)
             script.wait_until(start)
-            what = f"team frame {step} steps on after {after_ms:g} ms"
-            (script.obeyed if fresh else script.ignored)(script.team(step=step, what=what, fresh=fresh))
+            name = f"team frame {step} steps on after {after_ms:g} ms"
+            (script.obeyed if fresh else script.ignored)(script.team(step=step, what=name, fresh=fresh))
 
 
 @CHAPTER.rule(

@@ -27,14 +27,14 @@ def refused(script: TrialScript, ways: Iterable[tuple[str, How]], in_a_row: int 
     """
     in_a_row = in_a_row or (3 if script.n == 3 else 2)
     before = ""
-    for count, (what, how) in enumerate(ways):
+    for count, (mistake, how) in enumerate(ways):
         if count % in_a_row == 0:
             if count:
                 script.wait(GAP_MS)
             script.obeyed(script.team(lead=b"\xff", what=f"team frame{before}"))
-        before = f" after a {what}"
+        before = f" after a {mistake}"
         damaged: How = {"lead": b"", "fresh": False, "gap_ms": 0.0, **how}
-        script.ignored(script.team(what=what, **damaged))
+        script.ignored(script.team(what=mistake, **damaged))
     script.wait(GAP_MS)
     script.obeyed(script.team(lead=b"\xff", what=f"team frame{before}"))
 
@@ -54,8 +54,8 @@ def preamble(script: TrialScript) -> None:
         ("with a pause before its sync", How(pauses={0: 300.0})),
         ("with a pause in its preamble", How(pauses={-2: 5000.0})),
     )
-    for what, how in ways:
-        script.obeyed(script.team(what=f"team frame {what}", **how))
+    for condition, how in ways:
+        script.obeyed(script.team(what=f"team frame {condition}", **how))
 
 
 @CHAPTER.rule("P05", RECEPTION, presupposes="P04")
@@ -88,7 +88,7 @@ def crc(script: TrialScript) -> None:
 
 
 def leaving(register: int) -> int:
-    """What a CRC field must be wrong by so that a receiver's register is wrong by `register` after it."""
+    """The error of a CRC field after which a receiver's register is wrong by `register`."""
     for _ in range(16):
         top = register & 0x8000
         register = (register ^ POLYNOMIAL_REFLECTED if top else register) << 1 | (1 if top else 0)
@@ -160,12 +160,12 @@ def short_pauses(script: TrialScript) -> None:
         script.obeyed(script.team(what=f"team frame of a host {offset / 10_000:+g} %" if offset else ""))
     if not offset:
         places = range(1, script.form.size)
-        what = f"team frame with {SHORTEST_US:g} us before"
+        name = f"team frame with {SHORTEST_US:g} us before"
         everywhere = dict.fromkeys(places, SHORTEST_US)
-        script.obeyed(script.team(what=f"{what} each character", pauses=everywhere))
+        script.obeyed(script.team(what=f"{name} each character", pauses=everywhere))
         for place in places:
             pauses = {place: SHORTEST_US}
-            script.obeyed(script.team(what=f"{what} character {place}", lead=b"", pauses=pauses))
+            script.obeyed(script.team(what=f"{name} character {place}", lead=b"", pauses=pauses))
 
 
 @CHAPTER.rule("P12", RECEPTION, presupposes="P14 P16")
@@ -228,18 +228,18 @@ def garbage(script: TrialScript) -> None:
         ("246 random characters", noise[:246]),
         ("300 random characters", noise),
     )
-    for what, characters in kinds:
+    for disturbance, characters in kinds:
         script.characters(characters)
-        script.obeyed(script.team(what=f"team frame right after {what}", lead=b""))
+        script.obeyed(script.team(what=f"team frame right after {disturbance}", lead=b""))
     frames = (
         ("a bad stop bit", How(bad_stop=5)),
         ("a pause", How(pauses={7: 400.0})),
         ("a wrong bit", How(wrong={4: 4})),
     )
-    for what, how in frames:
+    for disturbance, how in frames:
         damaged: How = {"fresh": False, "gap_ms": 0.0, **how}
         script.team(**damaged)
-        script.obeyed(script.team(what=f"team frame right after one with {what}", lead=b""))
+        script.obeyed(script.team(what=f"team frame right after one with {disturbance}", lead=b""))
     for _ in range(3):  # none of three is lost, without a pause between them
         script.obeyed(script.team(what="team frame right after another", lead=b"", gap_ms=0.0))
     script.wait(12.0)

@@ -117,11 +117,11 @@ def addressed(script: TrialScript) -> None:
     words = (300, 30, 2500, 1500)
     for slot in script.topology.slots:
         others = tuple(other for other in script.topology.slots if other != slot)
-        what = f"service frame to robot {slot}, opcode "
-        frame = script.filter(words, f"{what}{Opcode.FILTER}", slot=slot)
+        name = f"service frame to robot {slot}, opcode "
+        frame = script.filter(words, f"{name}{Opcode.FILTER}", slot=slot)
         script.untouched(frame, others)
         _filter_taken(script, frame, words, "", (slot,))
-        script.untouched(script.acceleration(8000, f"{what}{Opcode.ACCELERATION}", slot=slot), others)
+        script.untouched(script.acceleration(8000, f"{name}{Opcode.ACCELERATION}", slot=slot), others)
     script.obeyed(script.team())
     absent = script.n - 2
     if absent not in script.topology.slots:

@@ -111,12 +111,12 @@ def supply(script: TrialScript) -> None:
         _begins_again(script, end, 20, "team frame after the supply was off")
 
 
-def _begins_again(script: TrialScript, tick: int, step: int, what: str) -> None:
+def _begins_again(script: TrialScript, tick: int, step: int, name: str) -> None:
     """Expects the state after power-on, from `tick` on: motors off, and a frame is fresh however many steps on."""
     script.wait_until(tick + ms(BOOTED_MS))
     script.wait(45.0)
     keeps_off(script, tick, script.now)
-    script.obeyed(script.team(step=step + 1, what=what))
+    script.obeyed(script.team(step=step + 1, what=name))
     script.answered(script.ask(gap_ms=36.0))
 
 

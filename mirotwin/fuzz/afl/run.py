@@ -24,7 +24,7 @@ def cores_for(jobs: int, proc: Path = Path("/proc")) -> list[int]:
 
 
 def shared_cores(jobs: int) -> list[str]:
-    """What there is to say about more jobs than cores, nothing where there are enough."""
+    """A note about more jobs than cores; nothing where there are enough cores."""
     cores = len(os.sched_getaffinity(0))
     if jobs <= cores:
         return []

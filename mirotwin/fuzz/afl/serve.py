@@ -76,7 +76,7 @@ def wait_status(kind: int) -> int:
 
 
 def hello(map_size: int) -> bytes:
-    """What the server says first."""
+    """The server's first message."""
     options = ENABLED | MAP_SIZE_FOLLOWS | CASES_IN_SHARED_MEMORY | (map_size - 1) << 1
     return struct.pack("<I", options)
 

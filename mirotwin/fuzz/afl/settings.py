@@ -69,7 +69,7 @@ def job_name(job: int, jobs: int) -> str:
 
 
 def missing() -> str | None:
-    """What of AFL++ is missing and how to get it; None where all is there."""
+    """The part of AFL++ that is missing and how to get it; None where all is there."""
     if sys.platform != "linux":
         return f"AFL++ is spoken to by System V shared memory as Linux has it; this is {sys.platform}"
     if shutil.which(PROGRAM) is None:

@@ -1,4 +1,4 @@
-"""Which format a file is in, told from its first bytes.
+"""Which format a file is in, by its first bytes.
 
 | the file begins with | it is |
 |---|---|
@@ -40,7 +40,7 @@ _TEXT = bytes(string.printable, "ascii")
 
 
 def detect(head: bytes) -> tuple[str, str]:
-    """(format, what to tell the user, or the empty string) of a file that begins with `head`.
+    """(format, a note for the user or the empty string) of a file that begins with `head`.
 
     `head` is the whole file, or its first `input.HEAD_BYTES`.
     """

@@ -50,7 +50,7 @@ def frame_counts(sent: Iterable[Transmission]) -> dict[int, int]:
 
 
 def robots_in(head: Sequence[Transmission], network: int) -> tuple[int, str]:
-    """(3 or 5, what to tell the user or nothing) for a network whose first transmissions are in `head`."""
+    """(3 or 5, a note for the user or nothing) for a network whose first transmissions are in `head`."""
     sent = [one for one in head if one.network == network and one.direction == DOWN]
     counts = frame_counts(sent)
     best = max(ROBOT_COUNTS, key=lambda count: (counts[count], -count))

@@ -97,7 +97,7 @@ class _Order:
         return self._before(min([tick, *(sent.tick for sent in self.open.values())]))
 
     def rest(self) -> list[Transmission]:
-        """What is left when nothing more comes."""
+        """The rest, at the end of the input."""
         self._take(self.last)
         for sent in self.open.values():
             self._push(sent)

@@ -117,7 +117,7 @@ def json_line(row: DecodedRow, timed: bool) -> str:
 
 
 def _fields(message: Message) -> dict[str, Any]:
-    """What a frame says besides its type and number."""
+    """The content of a frame besides its type and number."""
     if isinstance(message, TeamFrame):
         names = [field.name for field in VELOCITY]
         return {"velocities": [dict(zip(names, pair, strict=True)) for pair in message.velocities]}

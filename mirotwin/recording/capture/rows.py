@@ -49,7 +49,7 @@ class _Decoding:
         self.end_tick = 0
 
     def hear(self, sent: Transmission | None) -> Iterator[DecodedRow]:
-        """What these characters complete; None: what is pending cannot become a frame any more."""
+        """Rows that these characters complete; None ends the input: the pending characters are no frame then."""
         self.end_tick = self.end_tick if sent is None else sent.end_tick
         source = self.robot or self.decoder
         for reception in source.flush() if sent is None else source.hear(sent):

@@ -22,7 +22,7 @@ from mirotwin.recording.capture.input import Input
 from mirotwin.recording.container import RecordingError
 
 READ_ERRORS = (CaptureError, HexError, InputError, RecordingError, StreamError)
-"""What reading may raise: all that could be read has come before it."""
+"""Errors of reading; everything that could be read comes before them."""
 LINE_BYTES = 16 << 20
 _ESCAPED = re.compile(r"[\udc80-\udcff]")
 
@@ -100,7 +100,7 @@ def _stream(given: Input, tell: Callable[[str], None]) -> Iterator[Transmission]
 
 
 def _crystal_hz(header: Header) -> int:
-    """What a tick of the file is a period of; of a case for a bare processor its own crystal, if it names one."""
+    """The clock of the file's ticks; of a case for a bare processor its own crystal, if it names one."""
     named = (header.bare or {}).get("crystal_hz")
     return named if type(named) is int and named > 0 else TICKS_PER_SECOND
 

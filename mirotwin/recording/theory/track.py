@@ -181,7 +181,7 @@ class TheoryTrack:
                 self.backward += 1
 
     def _steer(self, robot: RobotPeriod) -> None:
-        """What this period's command demands; nothing, if the host gave none."""
+        """The demand of this period's command; nothing, if the host gave none."""
         control = robot.control
         if control is None:
             self._demand = None

@@ -143,13 +143,13 @@ def _is_apart(root: Any, path: str) -> bool:
     return False
 
 
-def item_differences(one: Any, other: Any, path: str = "") -> Iterator[tuple[str, Value, Value]]:
+def item_differences(value: Any, other: Any, path: str = "") -> Iterator[tuple[str, Value, Value]]:
     """(`[3]`, `.x_m`, .., or "" for what has no items; both values) of what differs."""
-    if _bits(one) == _bits(other):
+    if _bits(value) == _bits(other):
         return
-    items, others = _items(one), _items(other)
+    items, others = _items(value), _items(other)
     if not items or not others:
-        yield path, _plain(one), _plain(other)
+        yield path, _plain(value), _plain(other)
         return
     for name in {**items, **others}:
         yield from item_differences(items.get(name), others.get(name), path + name)

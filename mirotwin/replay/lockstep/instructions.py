@@ -52,7 +52,7 @@ class ValueDifference(Record, frozen=True):
 
 
 class InstructionDifference(Record, frozen=True):
-    """What two firmwares execute otherwise: where, and the registers and variables that differ after it.
+    """The instruction at which two firmwares differ, and the registers and variables that differ after it.
 
     `parted`: the instruction, of the first firmware, behind which they go on at different places.
     """
@@ -217,10 +217,10 @@ def first_reached(
 
 
 def _lasting(
-    one: Sequence[ExecutedInstruction], other: Sequence[ExecutedInstruction]
+    log: Sequence[ExecutedInstruction], other_log: Sequence[ExecutedInstruction]
 ) -> tuple[int, int] | None:
     """From which step on the states are not the same again, and at which they go different ways (-1: at none)."""
-    steps = list(zip(one, other, strict=False))
+    steps = list(zip(log, other_log, strict=False))
     first = len(steps)
     while first and steps[first - 1][0][1:] != steps[first - 1][1][1:]:
         first -= 1
@@ -230,10 +230,10 @@ def _lasting(
     return first, next(parted, -1)
 
 
-def _values(device: Device, image: Image, one: bytes, other: bytes) -> Iterator[ValueDifference]:
+def _values(device: Device, image: Image, state: bytes, other_state: bytes) -> Iterator[ValueDifference]:
     """Registers and variables that differ, by the names that people have for them; of the first firmware."""
     flat = Flat(device.board.cpu)
-    values, others = flat.decode(one), flat.decode(other)
+    values, others = flat.decode(state), flat.decode(other_state)
     for path, value in values.items():
         if path in DERIVED:
             continue

@@ -42,7 +42,7 @@ class DerivedMessage(NamedTuple):
 
 
 class Derived:
-    """What of a run goes to Foxglove, one control period after the other.
+    """Foxglove's messages of a run, one control period after the other.
 
     `scenario` None: it is not known; then there are no camera, no ball, no patches and no references.
     """

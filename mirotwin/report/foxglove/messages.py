@@ -142,7 +142,7 @@ INFO, WARNING, ERROR = 2, 3, 4
 
 
 class Log(msgspec.Struct, frozen=True):
-    """`level`: INFO, WARNING or ERROR. `name`: of whom it tells."""
+    """`level`: INFO, WARNING or ERROR. `name`: the subject of the line."""
 
     timestamp: Timestamp
     level: int

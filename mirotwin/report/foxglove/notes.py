@@ -60,7 +60,7 @@ def _more(before: int | None, now: int | None) -> int:
 
 
 def of_action(action: Action) -> Log:
-    """What was done to a robot, or to the radio of a network."""
+    """The line about an action on a robot, or on the radio of a network."""
     time = time_of(action.tick)
     if isinstance(action, RadioState):
         return Log(time, INFO, f"radio: {action.state}", f"net{action.network}")

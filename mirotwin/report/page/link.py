@@ -54,7 +54,7 @@ class Arrival(NamedTuple):
 
 
 class Arrivals:
-    """What the serial port of one of `robots` delivers, and when each character came."""
+    """Characters that the serial port of one of `robots` delivers, and when each came."""
 
     def __init__(self, log: BoardLog, robots: int) -> None:
         self.all: list[Arrival] = []
@@ -137,7 +137,7 @@ def lanes_of(marks: Sequence[LinkMark]) -> list[str]:
 
 
 def _named(sent: Transmission, robots: int) -> str:
-    """What the frames in a transmission say; empty where it holds none."""
+    """The content of the frames in a transmission; empty where it holds none."""
     decoder = Decoder(robots)
     frames = [one for one in [*decoder.hear(sent), *decoder.flush()] if isinstance(one, Received)]
     return ", ".join(_content(frame, robots) for frame in frames)

@@ -62,8 +62,8 @@ def _figure(pairs: Sequence[Pair], channel: str, end_s: float, marks: list[float
 
     made = panel(SHOWN[channel], Range1d(start=0.0, end=end_s, bounds=(0.0, end_s)), x_label="t [s]")
     for side, colour, width in ((1, "robot1", 4.0), (0, "robot0", 1.5)):
-        answers = [one for pair in pairs if (one := pair[side])]
-        times = [seconds(one.tick) for one in answers]
+        answers = [answer for pair in pairs if (answer := pair[side])]
+        times = [seconds(answer.tick) for answer in answers]
         line = made.step(times, _course(answers, channel), mode="after", line_width=width)
         tagged(line.glyph, line_color=colour)
     add_failures(made, marks)

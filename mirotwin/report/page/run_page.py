@@ -181,7 +181,7 @@ def _facts(material: Material, tracks: PageTracks) -> list[tuple[str, str, str]]
 def _data(
     tracks: PageTracks, marks: Sequence[LinkMark], frames: Sequence[CameraFrame], ticks: Sequence[int]
 ) -> bytes:
-    """What the page's JavaScript needs: postures as 64-bit floats in base64, so that none is rounded."""
+    """The data of the page's JavaScript: postures as 64-bit floats in base64, so that none is rounded."""
     lanes = lanes_of(marks)
     kinds = list(dict.fromkeys(mark.kind for mark in marks))
     return json_bytes(

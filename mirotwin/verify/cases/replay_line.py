@@ -39,8 +39,8 @@ def debug_line(
     expected: tuple[str, ...] = (),
 ) -> str:
     """The command that stands at the failed check of a case, or at a tick of a recording, to go back from there."""
-    image, at = None if firmware is None else f"{firmware}", "" if at_tick is None else f"{at_tick}t"
-    return DebugLineOptions(file=f"{file}", firmware=image, at=at, expected=expected).command_line()
+    image, place = None if firmware is None else f"{firmware}", "" if at_tick is None else f"{at_tick}t"
+    return DebugLineOptions(file=f"{file}", firmware=image, at=place, expected=expected).command_line()
 
 
 def replay_line(

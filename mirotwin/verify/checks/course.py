@@ -31,7 +31,7 @@ class CourseCheck(Check, frozen=True, kw_only=True):
         raise NotImplementedError
 
     def found(self, error: ErrorSample) -> str:
-        """What is wrong with where the robot is, or the empty string."""
+        """The error of the robot's place in words, or the empty string."""
         raise NotImplementedError
 
     def monitor(self, subject: Subject) -> Monitor[Check]:

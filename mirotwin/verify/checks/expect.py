@@ -41,7 +41,7 @@ CHECKS: Registry[object] = Registry(
 """By name; none is imported before it is named."""
 
 EXAMPLE_VALUES = {"condition": '{ event = "fault" }', "until_tick": "24000000"}
-"""What a message writes for a parameter without a default."""
+"""The text of a message for a parameter without a default."""
 WHERE_CHECKS_ARE = (
     "`mirotwin scenarios checks` lists them, --expect FILE.py:CLASS takes one of your own,"
     " `mirotwin examples checks` writes one to pip install"
@@ -174,7 +174,7 @@ def _takes_a_table(struct: type[Check], name: str) -> tuple[str, str]:
 def _wrong(
     scenario: Scenario | BoardScenario, origin: str, place: str, name: str, value: Any, message: str
 ) -> ScenarioError:
-    """What msgspec found, at the path of the scenario."""
+    """The error of msgspec, at the path of the scenario."""
     reason, _, inner = message.partition(" - at `$")
     if reason.startswith("Object missing required field"):
         key = reason.split("`")[1]

@@ -1,4 +1,4 @@
-"""Checks of the failsafe: without a fresh frame the wheels are told to stop in time, and the motors go off in time.
+"""Checks of the failsafe: without a fresh frame the wheels get the order to stop in time, and motors go off in time.
 
 Too early is as wrong as too late. The rule is `miro_protocol.robot_rules.SilenceRule` (protocol/README.md, "Freshness
 and failsafe").
@@ -42,7 +42,7 @@ class SilenceCheck(Check, frozen=True, kw_only=True):
 
 
 class FailsafeStop(SilenceCheck, frozen=True, kw_only=True, tag="failsafe_stop_ms"):
-    """Without a fresh frame both wheels are told to stop."""
+    """Without a fresh frame both wheels receive the order to stop."""
 
     WANTED = "both wheels told to stop"
 

@@ -67,7 +67,7 @@ class Failure(msgspec.Struct, frozen=True):
 
     @property
     def what(self) -> str:
-        """What is wrong."""
+        """The failure in words."""
         if self.alone_hz and (self.fault or not self.wanted):  # a fault says by itself what is wrong
             return self.found
         return f"wanted {self.wanted}, found {self.found}"
@@ -281,7 +281,7 @@ def checked_monitor(check: Check, subject: Subject) -> Monitor[Any]:
 
 
 def problem_of_class(struct: type[Check]) -> str:
-    """What the class of a check lacks, or the empty string."""
+    """The part that the class of a check lacks, or the empty string."""
     name = f"{struct.__module__}.{struct.__name__}"
     if getattr(struct, "KIND", None) not in get_args(Kind):
         return f"{name} has no KIND: write KIND = 'safety' (never) or 'liveness' (within a time)"

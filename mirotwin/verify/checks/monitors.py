@@ -45,16 +45,16 @@ from mirotwin.verify.checks.interface import (
 from mirotwin.verify.checks.sleep import Sleep
 
 
-def reception(received: Event, found: Received | Damaged, fresh: bool | None) -> Event:
+def reception(received: Event, decoded: Received | Damaged, fresh: bool | None) -> Event:
     """The `frame` or `damaged` event that a `received` one completes, at its tick."""
-    frame = found if isinstance(found, Received) else None
+    frame = decoded if isinstance(decoded, Received) else None
     return Event(
         tick=received.tick,
         what="damaged" if frame is None else "frame",
         network=received.network,
         slot=received.slot,
         value=int(bool(fresh)),
-        data=found.data,
+        data=decoded.data,
         frame=frame,
     )
 
@@ -213,12 +213,12 @@ class _DeviceMonitors:
             self.check = check
             monitor = self._monitor(check)
             self.monitors.append(monitor)
-            for what in monitor.EVENTS:
-                self.of_events.setdefault(what, []).append(monitor)
+            for kind in monitor.EVENTS:
+                self.of_events.setdefault(kind, []).append(monitor)
         self.of_ends, self.of_periods, self.of_times = map(self.that_have, ("period_over", "period", "until"))
-        self.pc_kinds = {*_RESTARTS, *(what for what in self.of_events if what in _FROM_PC)}
-        self.board_kinds = {what for what in self.of_events if what not in _FROM_PC}
-        if any(what in self.of_events for what in _FROM_RECEIVED):
+        self.pc_kinds = {*_RESTARTS, *(kind for kind in self.of_events if kind in _FROM_PC)}
+        self.board_kinds = {kind for kind in self.of_events if kind not in _FROM_PC}
+        if any(kind in self.of_events for kind in _FROM_RECEIVED):
             self.receiver = self._receiver()
             self.board_kinds.add("received")
         self.later = not self.board_kinds and all(monitor.LATER for monitor in self.monitors)
@@ -305,7 +305,7 @@ class _DeviceMonitors:
             monitor.end(tick)
 
     def cannot_judge(self, check: Check, error: BaseException) -> PluginError:
-        """What to raise for what a check raised."""
+        """The error to raise in place of an exception of a check."""
         place = "" if self.subject.alone else f"net{self.line.index}/robot{self.device.slot}: "
         named = f"{place}check {check.name!r} cannot judge"
         if isinstance(error, PluginError):

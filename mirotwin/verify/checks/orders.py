@@ -63,7 +63,7 @@ class Orders:
 
 
 class OrdersMonitor(Monitor[C_co]):
-    """Knows the orders to the wheels; whoever hears of commands takes them into it."""
+    """The orders to the wheels; whoever receives a command adds it here."""
 
     def __init__(self, check: C_co, subject: Subject) -> None:
         super().__init__(check, subject)

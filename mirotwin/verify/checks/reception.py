@@ -1,4 +1,4 @@
-"""Checks of what a robot makes of the frames that it hears."""
+"""Checks of how a robot acts on the frames that it receives."""
 
 from __future__ import annotations
 
@@ -22,7 +22,7 @@ Words = tuple[int, int]
 
 
 class MovesOnlyWhenFresh(Check, frozen=True, kw_only=True, tag="moves_only_when_fresh"):
-    """A wheel is told to turn only within `within_ms` of the last character of a fresh frame."""
+    """A wheel receives an order to turn only within `within_ms` of the last character of a fresh frame."""
 
     KIND: ClassVar[Kind] = "safety"
 

@@ -54,7 +54,7 @@ class SerialMonitor(Monitor[C_co]):
 
     @property
     def sent_since_reset(self) -> bytes:
-        """What was sent after the last reset, which may have cut something off."""
+        """The characters sent after the last reset, which may have cut a character off."""
         since = -1 if self.reset_tick is None else self.reset_tick
         return bytes([character.value for character in self.sent if character.tick > since])
 

@@ -49,7 +49,7 @@ class Step(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_only=True
 
     VERB: ClassVar[str] = ""
     CHANGES: ClassVar[bool] = True
-    """What follows would be something else without it."""
+    """Whether later steps depend on this one."""
     NEEDS: ClassVar[Feature | None] = None
     """Of the machine."""
 
@@ -149,7 +149,7 @@ class SendFrame(Send, frozen=True, kw_only=True):
         return host.next_seq()
 
     def frame(self, host: Host, slot: int, seq: int) -> TeamFrame | ServiceFrame:
-        """What `host` sends to the robot in `slot`, with this number."""
+        """The transmission of `host` to the robot in `slot`, with this number."""
         raise NotImplementedError
 
 
@@ -390,7 +390,7 @@ class CheckStep(OfRobot, frozen=True, kw_only=True):
 
 
 class RadioStep(OfNetwork, frozen=True, kw_only=True):
-    """`radio`: of a network: `up`, `down` (no carrier) or `noise` (the receiver hears noise)."""
+    """`radio`: of a network: `up`, `down` (no carrier) or `noise` (the receiver gets noise)."""
 
     VERB = "radio"
     NEEDS = "switch"
@@ -465,14 +465,14 @@ VERBS = ("send", *LOOKING, *PLAIN)
 
 
 def beyond(slot: int | None, robots: int) -> str:
-    """What is wrong with a slot that a network of so many does not have, or the empty string."""
+    """The error of a slot that a network of `robots` robots does not have, or the empty string."""
     if slot is None or slot < robots:
         return ""
     return f"slot: {slot} does not exist on a network of {robots} robots; use 0 to {robots - 1}"
 
 
 def absent(slot: int | None, network: ScenarioNetwork) -> str:
-    """What is wrong with a slot that has no robot on `network`, or the empty string."""
+    """The error of a slot that has no robot on `network`, or the empty string."""
     slots = sorted(robot.slot for robot in network.robot)
     if slot is None or slot in slots:
         return ""

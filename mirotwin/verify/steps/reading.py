@@ -121,7 +121,7 @@ class _Table:
     # Keys
 
     def choice(self, verb: str, choices: Mapping[str, type[S]]) -> type[S]:
-        """What the verb's value names."""
+        """The choice that the verb's value names."""
         value = self.table[verb]
         if isinstance(value, str) and value in choices:
             return choices[value]
