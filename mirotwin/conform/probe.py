@@ -87,7 +87,7 @@ def _begins_again(listener: Listener) -> str:
     board = listener.subject.robot.board
     if turned_tick is None or board.left.reset_tick <= turned_tick:
         return ""
-    return f"it begins again by itself: it reset its LM629s at {board.left.reset_tick / TICKS_PER_MS:.0f} ms"
+    return f"it resets unexpectedly: it reset its LM629s at {board.left.reset_tick / TICKS_PER_MS:.0f} ms"
 
 
 def _serial_port(events: Sequence[Event], frame: Frame) -> str:

@@ -273,7 +273,9 @@ class TrialScript:
     def obeyed(self, frame: Frame) -> Frame:
         """Both wheels receive the frame's velocities in time. A wheel that receives 0 may also be stopped."""
 
-        @self.expects(frame.acted_tick, f"the wheels told as by {frame.what} within {ACTING_MS:g} ms")
+        @self.expects(
+            frame.acted_tick, f"the velocities of {frame.what} at the wheels within {ACTING_MS:g} ms"
+        )
         def test(observed: Observed) -> Found:
             orders = observed.both_orders(frame.acted_tick)
             wanted = frame.for_robot(observed.slot)
@@ -296,7 +298,7 @@ class TrialScript:
             for order in observed.ordered(after_tick, until_tick):
                 before = observed.last_order(order.side, after_tick)
                 if (order.what, order.velocity) != (before.what, before.velocity):
-                    yield order.tick, f"the {order.side} wheel told {in_words(order)}"
+                    yield order.tick, f"an order to the {order.side} wheel: {in_words(order)}"
 
     def untouched(self, frame: Frame, slots: tuple[int, ...] = (), since: Frame | None = None) -> None:
         """The chips receive only commands that read. `since`: the failsafe must not count from that frame."""
@@ -339,10 +341,10 @@ def _instead(observed: Observed, frame: Frame, orders: tuple[Order, Order]) -> s
     if max(order.tick for order in orders) <= frame.tick:
         late = _obeyed_late(observed, frame)
         if late is not None:
-            return f": told so {(late - frame.end_tick) / TICKS_PER_MS:.2f} ms after its end"
+            return f": obeyed {(late - frame.end_tick) / TICKS_PER_MS:.2f} ms after its end"
         wrote = observed.wrote(frame.tick, frame.acted_tick)
         loaded = any(one.opcode == _LTRJ and one.data[1:2] and one.data[1] & _VELOCITY for one in wrote)
-        return ": loaded, but not started (STT)" if loaded else ": nothing was told"
+        return ": loaded, but not started (STT)" if loaded else ": no order came"
     mistake = wheels_instead(orders, frame, observed.slot)
     return f": {mistake}" if mistake else ""
 

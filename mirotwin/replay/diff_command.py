@@ -134,7 +134,9 @@ def _are_images(options: DiffOptions) -> bool:
     if len(images) == 1:
         recording = paths[paths[0] == images[0]]
         line = command_line("replay", operand(recording), "--firmware", operand(images[0]))
-        raise BadInput(images[0], "", f"is an image, and {recording} is none", f"give two, or use `{line}`")
+        raise BadInput(
+            images[0], "", f"is an image, and {recording} a recording", f"give two images, or use `{line}`"
+        )
     if not images:
         reason = "is for two images, and a recording has its own"
         refuse_given(paths[0], reason, options.given("on", "seed", "settings"))

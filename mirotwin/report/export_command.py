@@ -164,7 +164,12 @@ def _some(pieces: Iterable[bytes], exported: Exported, label: str) -> Iterator[b
     yield from pieces
     if exported.network is not None and not exported.down + exported.up and exported.failure is None:
         there = ", ".join(map(str, sorted(exported.networks))) or "none"
-        raise BadInput(label, f"--network {exported.network}", "nothing of it", f"networks there: {there}")
+        raise BadInput(
+            label,
+            f"--network {exported.network}",
+            "has no transmissions",
+            f"networks that have some: {there}",
+        )
 
 
 def _write(out: str, pieces: Iterable[bytes]) -> None:

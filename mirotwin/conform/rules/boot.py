@@ -77,7 +77,7 @@ def keeps_off(script: TrialScript, after_tick: int, until_tick: int) -> None:
     def ordered(observed: Observed) -> Found:
         for order in observed.ordered(after_tick, until_tick):
             if order.what != "off":
-                yield order.tick, f"the {order.side} one told {in_words(order)}"
+                yield order.tick, f"an order to the {order.side} wheel: {in_words(order)}"
 
     @script.expects(until_tick, "both motors off")
     def driven(observed: Observed) -> Found:

@@ -102,7 +102,7 @@ def _together(script: TrialScript, after_tick: int, until_tick: int, name: str) 
     def test(observed: Observed) -> Found:
         left, right = observed.both_orders(until_tick)
         if min(left.tick, right.tick) <= after_tick:
-            yield until_tick, "a wheel that was told nothing"
+            yield until_tick, "a wheel without an order"
         grid = observed.samples[-1][1]
         if (left.tick - grid) // SAMPLE_TICKS != (right.tick - grid) // SAMPLE_TICKS:
             yield max(left.tick, right.tick), f"{abs(left.tick - right.tick)} ticks from one to the other"

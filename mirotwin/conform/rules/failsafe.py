@@ -119,7 +119,7 @@ def _stays_closed(script: TrialScript, last: Frame, until_tick: int) -> None:
     def test(observed: Observed) -> Found:
         for order in observed.ordered(last.acted_tick, until_tick):
             if order.abrupt or order.what == "off":
-                yield order.tick, f"the {order.side} wheel told {in_words(order)}"
+                yield order.tick, f"an order to the {order.side} wheel: {in_words(order)}"
 
 
 @CHAPTER.rule(
@@ -202,7 +202,7 @@ def _in_time(script: TrialScript, last: Frame, after_ticks: int, order_kind: str
         for side in SIDES:
             order = observed.last_order(side, earliest)
             if done(observed, side, earliest) and order.tick <= last.tick:
-                yield latest, f"the {side} one told {in_words(order)} before it already"
+                yield latest, f"an earlier order to the {side} wheel: {in_words(order)}"
             elif done(observed, side, earliest):
                 yield order.tick, f"the {side} one {in_ms(order.tick - last.end_tick)} after its end"
         if not all(done(observed, side, latest) for side in SIDES):

@@ -40,7 +40,7 @@ Waiting = tuple[int, int, tuple[int, int]]
 
 class ActsAtAll(Check, frozen=True, kw_only=True, tag="acts_at_all"):
     """Of 5 fresh frames in a row that reach the robot undisturbed and ask for other speeds, it acts on one: it tells
-    the wheels to turn, and their motors are driven. It does not begin again by itself.
+    the wheels to turn, and their motors are driven. It does not reset unexpectedly.
     """
 
     KIND: ClassVar[Kind] = "liveness"
@@ -195,9 +195,7 @@ class AliveMonitor(Monitor[ActsAtAll]):
             if tick in turns:
                 self.turned = True
             elif self.turned:
-                self.fail(
-                    tick, "a robot that does not begin again by itself", "the firmware reset the LM629s"
-                )
+                self.fail(tick, "a robot that does not reset unexpectedly", "the firmware reset the LM629s")
                 self.turned = False
 
     def _due(self, tick: int) -> list[Waiting]:

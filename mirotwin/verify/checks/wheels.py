@@ -48,7 +48,7 @@ class WheelsMonitor(OrdersMonitor[WheelsWithin]):
         self.judged += 1
         speed_m_s = order.velocity / _UNITS_OF_1616 / _NOMINAL.units_per_m_s
         if abs(speed_m_s) > self.check.limit_m_s:
-            wanted = f"a wheel told at most {self.check.limit_m_s:g} m/s"
+            wanted = f"orders to a wheel of at most {self.check.limit_m_s:g} m/s"
             self.fail(event.tick, wanted, f"{speed_m_s:.4f} m/s for the {order.side} one")
 
     def period(self, record: RobotPeriod, tick: int) -> None:

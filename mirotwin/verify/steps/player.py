@@ -294,7 +294,7 @@ def _meanwhile(earlier: Sequence[Event]) -> str:
         return "nothing happened meanwhile"
     counted = Counter(event.what for event in events)
     parts = ", ".join(f"{count} {what}" for what, count in counted.items())
-    return f"none of it, but {parts}; the last: {events[-1]}"
+    return f"only {parts}; the last: {events[-1]}"
 
 
 def player_of(world: World, steps: Sequence[Step], origin: str) -> Player | None:

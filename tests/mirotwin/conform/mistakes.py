@@ -45,7 +45,7 @@ _PLANTED = {
     "does not whiten its answers": ("", ("begin with P42", "its HDR 96h is not whitened")),
     "never stops": ("", ("begin with P29", "found left not within 7")),
     "stops by opening the loops": (
-        "", ("begin with P31", "wanted a smooth stop, found the left wheel told off")),
+        "", ("begin with P31", "wanted a smooth stop, found an order to the left wheel: off")),
     "never answers": ("", ("begin with P42", "wanted an answer to some of 9 questions in a row, found none")),
     "answers every question": (
         "", ("begin with P41", "is for robot 0", "an answer of robot 1 to question 60")),
@@ -288,7 +288,7 @@ MISTAKES = {name: Mistake(*PLANTED[name][1:4], *told) for name, told in _PLANTED
         "        put_word(r);\n    }", says=("P57", "read while busy (01h)")),
     "a firmware that begins again every 100 ms": Mistake(
         "failsafe.c", "    ++ticks_taken;", "    if (++ticks_taken == 100)\n        ((void (*)(void))0)();",
-        says=("begins again by itself: it reset its LM629s",)),
+        says=("resets unexpectedly: it reset its LM629s",)),
     "LM629s that are held in reset": Mistake(
         "lm629.c", "    LM629_RST = 1;\n    if (!boots", "    if (!boots",
         says=("begin with P24: it holds its LM629s in reset",)),

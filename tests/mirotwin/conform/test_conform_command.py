@@ -100,7 +100,7 @@ def test_json_is_a_line_a_rule(mirotwin, tmp_path):
         ("P43", "not judged", "P03", 0),
     ]
     first = lines[0]["first"]
-    assert first["wanted"] == "the wheels told as by team frame, seq 1 within 10 ms"
+    assert first["wanted"] == "the velocities of team frame, seq 1 at the wheels within 10 ms"
     assert list(first) == ["check", "network", "slot", "tick", "wanted", "found", "fault"]
 
 
@@ -119,7 +119,7 @@ def test_junit_has_a_case_a_rule_and_the_same_bytes_every_time(mirotwin, tmp_pat
     cases = suite.findall("testcase")
     assert [case.get("name") for case in cases] == ["P03 ready", "P15 slicer noise"]
     failure = cases[0].find("failure")
-    assert "wanted the wheels told as by" in str(failure.get("message"))
+    assert "wanted the velocities of" in str(failure.get("message"))
     skipped = cases[1].find("skipped")
     assert skipped.get("message") == "not judged: P03 failed, it is not ready 40 ms after power-on"
     names = [one.get("name") for one in suite.iter("property")]

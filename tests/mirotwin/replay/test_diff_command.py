@@ -270,7 +270,7 @@ def test_an_image_and_a_recording_are_compared_by_replay(mirotwin, finished, tmp
     for pair in ((image, finished), (finished, image)):
         err = mirotwin.refuses("diff", *pair)
         assert (
-            f"{image}: is an image, and {finished / 'run.mcap'} is none; give two, or use `mirotwin replay "
+            f"{image}: is an image, and {finished / 'run.mcap'} a recording; give two images, or use `mirotwin replay "
             in err
         )
 

@@ -150,7 +150,7 @@ def test_what_cannot_be_converted_is_named_and_nothing_is_written(mirotwin, tmp_
 def test_a_network_that_is_not_there_is_an_error_that_names_those_that_are(mirotwin, finished, tmp_path):
     out = tmp_path / "x.pcapng"
     err = mirotwin.refuses("export", finished / "run.mcap", "--network", 9, "--out", out)
-    assert "--network 9: nothing of it; networks there: 0" in err
+    assert "--network 9: has no transmissions; networks that have some: 0" in err
     assert not out.exists()
 
 

@@ -153,7 +153,7 @@ def test_what_the_header_expects_is_judged(mirotwin, tmp_path):
     stream.write(tmp_path / "a.stream", SENT[:1], stream_header.of_text(missed))
     err = mirotwin.ends(1, "replay", "-q", tmp_path / "a.stream")
     assert err.startswith("mirotwin: expectation failed: wheels_within_m_s: net0/robot0: tick ")
-    assert err.count("wanted a wheel told at most 0.04 m/s, found 0.0439 m/s for the left one") == 1
+    assert err.count("wanted orders to a wheel of at most 0.04 m/s, found 0.0439 m/s for the left one") == 1
     mirotwin.succeeds("replay", "-q", tmp_path / "a.stream", "--expect", "wheels_within_m_s=0.05")
 
 

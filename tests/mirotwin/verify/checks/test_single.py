@@ -75,7 +75,7 @@ def test_firmware_that_begins_again_by_itself_fails_and_one_that_is_reset_does_n
     running = world(built("motion.c", "    state = STATE_DRIVING;", again))
     checks = Checks(running)
     assert finish(running, checks)["acts_at_all"] == "failed"
-    assert "wanted a robot that does not begin again by itself" in str(checks.failures[0])
+    assert "wanted a robot that does not reset unexpectedly" in str(checks.failures[0])
     healthy = world(own_image())
     checks = Checks(healthy)
     for begun_tick, for_ticks in ((8_000_000, 100_000), (12_100_000, 400_000), (16_000_000, 1_700_000)):
@@ -234,7 +234,7 @@ def test_wheels_that_are_told_to_turn_too_fast_fail_at_the_command():
     failures, _, _ = driven("expect.wheels_within_m_s={limit_m_s=0.15, overshoot_m_s=10.0}")
     assert failures
     for one in failures:
-        assert one.wanted == "a wheel told at most 0.15 m/s"
+        assert one.wanted == "orders to a wheel of at most 0.15 m/s"
         assert abs(float(one.found.split()[0])) > 0.15
         assert one.tick % CONTROL_PERIOD_TICKS != 0
     assert driven("expect.wheels_within_m_s=1.46")[2]["wheels_within_m_s"] == "passed"

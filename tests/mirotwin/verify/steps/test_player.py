@@ -89,7 +89,7 @@ def test_a_step_that_is_not_reached_in_time_says_when_what_was_wanted_and_what_w
     assert (failure.number, failure.begun_tick, failure.tick) == (3, 5 * MS, 105 * MS)
     assert failure.step == "step 3 (never asked): wait_for answer"
     assert failure.wanted == "answer within 100 ms"
-    found = "none of it, but 1 sent, 23 received, 1 frame, 4 command; the last: tick "
+    found = "only 1 sent, 23 received, 1 frame, 4 command; the last: tick "
     assert failure.found.startswith(found)
     assert failure.found.endswith("net0/robot0: command right STT")
 
