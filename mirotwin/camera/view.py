@@ -51,7 +51,7 @@ class View:
         return taken(self.sight.eye)
 
     def png(self, plain: bool) -> bytes:
-        """It as a file: `plain`, or enlarged with the overlay."""
+        """The picture as a PNG file: `plain`, or enlarged with the overlay."""
         picture = self.picture()
         if plain:
             return png(picture.image())
@@ -67,7 +67,7 @@ class View:
 
 
 def view_of(world: World, index: int, origin: str) -> View:
-    """Of one network. Raises BadInput if there is none, or if its camera has no pixels; `origin`: the scenario."""
+    """The view of one network. Raises BadInput if it does not exist, or if its camera has no pixels."""
     networks = world.networks
     if not 0 <= index < len(networks):
         there = f"0 to {len(networks) - 1}" if len(networks) > 1 else "only 0"

@@ -59,7 +59,7 @@ class MetricDifference(msgspec.Struct, frozen=True):
 def differences(
     metrics: Sequence[str], first: ResultRows, second: ResultRows, pairs: Sequence[tuple[int, int]]
 ) -> list[tuple[MetricDifference, Numbers]]:
-    """Of each metric that both rows of a pair (row of `first`, row of `second`) have, with second minus first."""
+    """The difference (second minus first) of each metric that both rows of a pair have. A pair: two row numbers."""
     compared = []
     places, samples = np.array(pairs, dtype=np.int64).reshape(-1, 2), second.samples()
     for name in metrics:

@@ -97,7 +97,7 @@ def _name(path: str) -> str:
 
 
 def write(plan: Plan, journal: Path, results: Path) -> None:
-    """Both files of a campaign whose runs all have an outcome in `journal`. Raises OutputError."""
+    """Writes both files of a campaign whose runs all have an outcome in `journal`. Raises OutputError."""
     import pyarrow as pa
     import pyarrow.parquet as pq
 

@@ -38,7 +38,7 @@ def in_words(order: Order) -> str:
 
 
 def payload_of(words: Iterable[Pair]) -> bytes:
-    """Of a team frame."""
+    """The payload of a team frame."""
     return b"".join(word.to_bytes(2, "little", signed=True) for pair in words for word in pair)
 
 

@@ -34,7 +34,7 @@ from mirotwin.verify.checks.faults import NoFault
 from mirotwin.verify.checks.interface import Failure
 
 FAULTS_KEPT = 20
-"""Of a robot in a trial."""
+"""Largest number of saved faults of a robot in a trial."""
 
 
 class Outcome(msgspec.Struct, frozen=True):
@@ -174,7 +174,7 @@ def _try_and_explain(
 
 
 def in_order(rules: Sequence[Rule], tried: Callable[[Rule], Outcome]) -> Iterator[Outcome]:
-    """Those that others presuppose first. Where one of `rules` failed that a rule presupposes, it is not `tried`."""
+    """Tries presupposed rules first. A rule is not `tried` where one of `rules` that it presupposes failed."""
     causes: dict[str, str] = {}
     for rule in presupposed_first(rules):
         cause = next((causes[one.id] for one in presupposed(rule) if one.id in causes), "")

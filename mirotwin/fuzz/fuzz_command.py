@@ -245,7 +245,7 @@ def _engine(spec: TargetSpec, passing: list[bytes], folder: CampaignFolder, opti
 
 
 def _sorted_out(target: Target, inputs: Iterable[bytes]) -> tuple[list[bytes], list[bytes], list[bytes]]:
-    """Those that fail, those that an engine can begin with, and those that execute no branch."""
+    """Sorts inputs into those that fail, those that an engine can begin with, and those that execute no branch."""
     failing: list[bytes] = []
     passing: list[bytes] = []
     silent: list[bytes] = []

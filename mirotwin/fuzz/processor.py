@@ -35,7 +35,7 @@ class Processor:
 
     @property
     def board(self) -> Processor:
-        """It is its own board where checks look at it."""
+        """The board that checks look at: the processor itself."""
         return self
 
     def start_up(self, crystal_hz: int, boot_ms: int) -> None:

@@ -25,7 +25,7 @@ from mirotwin.fuzz.spec import MAP_SIZE, TargetSpec
 from mirotwin.shell.firmware_image import BOOT_PERIODS, is_up, load_firmware, not_up
 
 NEVER_SLEEPS = "never_sleeps"
-"""That the firmware did not go back to sleep. On the robot's board what follows from it is judged."""
+"""The check that the firmware goes back to sleep. On the robot's board the effects of that are judged."""
 NEVER_SLEEPS_CODE = len(NAMES)
 
 
@@ -67,7 +67,7 @@ class Target(ABC):
     @property
     @abstractmethod
     def failure(self) -> TargetFailure | None:
-        """Of the last run."""
+        """The failure of the last run."""
 
     @abstractmethod
     def run(self, data: Any) -> int:

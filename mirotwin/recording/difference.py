@@ -42,7 +42,7 @@ class Difference(msgspec.Struct, frozen=True):
         return topic_name(self.channel, self.network, self.slot)
 
     def values(self) -> tuple[str, str]:
-        """Both as text."""
+        """The recorded and the replayed value as text."""
         if self.channel == DIGEST:
             return f"{self.recorded}"[:12], f"{self.replayed}"[:12]
         return shown(self.recorded), shown(self.replayed)

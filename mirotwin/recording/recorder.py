@@ -67,7 +67,7 @@ class RunSource(msgspec.Struct, frozen=True):
 
 
 def source_of(text: ScenarioText, world: World, record: str = "default", resumed: bytes = b"") -> RunSource:
-    """Of a run of `world`, which is made of `text`."""
+    """The sources of a run of `world`, which is made of `text`."""
     image = world.image
     return RunSource(
         scenario_name=text.scenario.name,

@@ -189,7 +189,7 @@ def _duty(axis: Axis) -> DutyMessage:
 
 @cache
 def _robot_topics(network: int, slot: int) -> list[str]:
-    """Of the messages that a robot has in each period, in their order."""
+    """Topics of the messages that a robot has in each period, in their order."""
     names = ("reference", "truth", "measurement", "control", "firmware", "lm629", "pwm")
     return [topic_name(name, network, slot) for name in names]
 

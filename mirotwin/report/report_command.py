@@ -186,7 +186,7 @@ def _command(wanted: ReportOptions, job: Job) -> str:
 
 
 def _played_with(image: Image, kind: str, recorded: Image | None = None) -> str:
-    """That the page is of another firmware than what was recorded."""
+    """A note that the page shows another firmware than the recorded one."""
     own = f" ({recorded.sha256[:12]})" if recorded is not None and recorded.sha256 else ""
     return (
         f"Played with another firmware, {image.path.name} ({(image.sha256 or '')[:12]}), than the {kind}'s{own}."

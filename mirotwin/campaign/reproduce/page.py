@@ -29,7 +29,7 @@ NAMES = {
     LEARNING: "the same, with `self_calibration`",
 }
 FIGURES = {f"Fig. {start.figure}": start.figure for start in STARTS[:3]}
-"""Those that other cameras and disturbances are tried on."""
+"""Figures on which other cameras and disturbances are tried."""
 
 HEAD = """\
 # The paper's section V, run again
@@ -120,7 +120,7 @@ COLUMNS: dict[str, Callable[[Sequence[RunRow]], str]] = {
     "across": lambda rows: f"{sum(row.crossings > 0 for row in rows)}",
     "chattering m/s2": lambda rows: number(middle(settled(rows), "chattering_m_s2")),
 }
-"""Of a figure's table, but for the controller; READING says what they mean."""
+"""Columns of a figure's table after the controller; READING explains them."""
 
 
 def _figures(table: Table, folder: str) -> Iterator[str]:

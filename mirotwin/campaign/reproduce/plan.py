@@ -69,7 +69,7 @@ SETTINGS: Mapping[str, tuple[str, ...]] = {
     IMPROVED: IMPROVED_SETTINGS,
     LEARNING: (*IMPROVED_SETTINGS, "camera.self_calibration=lines"),
 }
-"""Of each controller; with the scenario's gains where there are none."""
+"""Settings of each controller; one without gains takes those of the scenario."""
 CONTROLLERS = tuple(SETTINGS)
 CAMERAS = {"white noise": "camera={kind = 'gaussian'}", "pixels, exact": "camera.calibration=exact"}
 """Other cameras than that of the scenarios, which is `1997`; for Figs. 6 to 8."""

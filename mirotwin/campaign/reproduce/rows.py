@@ -91,7 +91,7 @@ def percentile(rows: Sequence[RunRow], name: str, share: float) -> float | None:
 
 
 def middle_seeds(table: Table) -> dict[str, int]:
-    """Of each group the seed whose error is the median (of an even number, the lower one); none, if all failed."""
+    """The seed of each group whose error is the median (of an even number, the lower one); none, if all failed."""
     middles = {}
     for label, rows in table.items():
         ordered = sorted((row.rms_position_cm, row.seed) for row in rows if row.rms_position_cm is not None)

@@ -16,7 +16,7 @@ from mirotwin.conform.trial_script import BOOTED_MS, Found, TrialScript, ms
 
 CHAPTER = Chapter("Soundness")
 LONG = Chapter("Long trials")
-"""Of a minute or more of virtual time: `mirotwin conform --long`."""
+"""Trials of a minute or more of virtual time: `mirotwin conform --long`."""
 _FRAMES = 2000
 _EACH = 100
 _OFF_MS = 520.0

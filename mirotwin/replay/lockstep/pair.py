@@ -73,7 +73,7 @@ class WorldPair:
         return bool(self.fields())  # the digests before may differ, and all else be the same again
 
     def fields(self) -> tuple[FieldDifference, ...]:
-        """Those that differ, of the fields that both have."""
+        """The fields that differ, of those that both worlds have."""
         return tuple(differing(self.one, self.other))
 
     def mark(self) -> tuple[Mark, Mark]:

@@ -66,7 +66,7 @@ class Builds:
         self.gone: dict[Key, Found] = {}  # what differed at two looks or more, the first time
 
     def variables(self, until_tick: int) -> list[VariableDifference]:
-        """Those that differ when both processors sleep last before `until_tick`, by when that began.
+        """The variables that differ when both processors sleep last before `until_tick`, by when that began.
 
         Where none does, those that did for a while.
         """

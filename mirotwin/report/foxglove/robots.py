@@ -128,7 +128,7 @@ def reference_points(robot: RobotSpec, duration_s: float) -> tuple[Point, ...]:
 
 
 def reference_line(network: int, slot: int, points: Iterable[Point], time: Timestamp) -> SceneEntity:
-    """It as a line on the floor."""
+    """The reference as a line on the floor."""
     line = shapes.line(points, PATH_Z_M, WIDE_M, REFERENCE)
     name = f"{robot_frame(network, slot)}/path"
     return SceneEntity(timestamp=time, frame_id=PITCH, id=name, lines=(line,))

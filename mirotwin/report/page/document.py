@@ -16,7 +16,7 @@ from mirotwin.shell.program import show_line
 from mirotwin.shell.verdicts import DONE
 
 MOST_BYTES = 50_000_000
-"""Of a page: browsers take more, people and mail do not."""
+"""Largest size of a page: browsers take more, people and mail do not."""
 ASSETS = Path(__file__).parent / "assets"
 GENERATOR = b'<meta name="generator" content="mirotwin report">'
 """In the head of every page."""

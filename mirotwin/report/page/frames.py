@@ -19,7 +19,7 @@ from mirotwin.recording.container import Cut
 from mirotwin.recording.messages import Messages
 
 QUALITY = 72
-"""Of a JPEG; noise of the picture is hardly kept below 60."""
+"""Quality of a JPEG; below 60 the picture's noise is hardly left."""
 
 
 class CameraFrame(msgspec.Struct, frozen=True):

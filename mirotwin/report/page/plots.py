@@ -35,7 +35,7 @@ KIND_COLOURS = {
 }
 """Kinds of marks and their colours, in the order in which they are drawn: what went wrong lies on top."""
 HEIGHTS = {"noise": 0.26, "damaged": 0.94, "lost": 0.94}
-"""Of a lane; 0.6 for all others."""
+"""Heights of marks as a share of their lane; 0.6 for all others."""
 LEAST_M_S, LEAST_RAD_S = 0.01, 0.1
 """The least that an axis of speeds spans: some forty steps of the encoder over a control period, at the wheel."""
 HOLLOW, WRONG = ("lost",), ("damaged", "lost")

@@ -35,7 +35,7 @@ from mirotwin.verify.cases.case import tables_of
 SILENT = "silent"
 MARGIN_CM = 3.0
 MOST_POINTS = 4000
-"""Of a path; a longer one is drawn with every second point, or every third, and so on."""
+"""Largest number of points of a path; a longer one is drawn with every second point, or every third, and so on."""
 
 
 class Material(msgspec.Struct, frozen=True, kw_only=True):

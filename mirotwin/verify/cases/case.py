@@ -40,7 +40,7 @@ from mirotwin.verify.checks.monitors import Checks
 
 
 class Trace:
-    """Of a world at tick 0 from now on. Raises ValueError for one that has moved."""
+    """Records a world from tick 0 on. Raises ValueError for a world that has moved."""
 
     def __init__(self, world: World) -> None:
         if world.tick:

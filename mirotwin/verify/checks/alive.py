@@ -31,7 +31,7 @@ FRAMES = 5
 SLOWEST = 256
 """A speed of one count per LM629 sample (22 mm/s): 500 counts between two frames."""
 FURTHEST_PPM = 10_000
-"""Of the PC's clock beside the robots'; further off a UART may lose characters."""
+"""Largest error of the PC's clock beside the robots'; further off a UART may lose characters."""
 UNLIKELY = 1e-12
 MOST_FRAMES = 10_000
 _STT = BY_NAME["STT"].opcode

@@ -30,7 +30,7 @@ from mirotwin.verify.checks.interface import Check, problem_of_class
 
 ALWAYS_ON = ("no_fault", "lm629_protocol", "main_loop_alive", "stack_clear", "acts_at_all")
 ALONE_ALWAYS_ON = "no_fault"
-"""Of a board alone."""
+"""The check that is always on for a board alone."""
 
 CHECKS: Registry[object] = Registry(
     word="check",
@@ -70,7 +70,7 @@ def expectations_of(scenario: Scenario | BoardScenario, origin: str) -> dict[Rob
 
 
 def expectations_in(text: ScenarioText) -> dict[RobotId, list[Check]]:
-    """Those of a scenario that was read; an error names the setting that it concerns."""
+    """The expectations of a scenario that was read; an error names the setting that it concerns."""
     try:
         return expectations_of(text.scenario, text.origin)
     except ScenarioError as error:

@@ -171,7 +171,7 @@ class Checks:
 
     @property
     def sleep(self) -> Sleep | None:
-        """Of a board alone: who drives the run stops where it wants to look."""
+        """The sleep of a board alone; the driver of the run stops at the ticks that it needs."""
         return self.devices[0].subject.sleep
 
     def verdict(self) -> Verdict:

@@ -8,7 +8,7 @@ from miro_robot.mcs51.uart import STOPPED_TICK
 
 
 class Sleep:
-    """Of the processor of a board alone. Who drives the run stops at each `next_tick`.
+    """The sleep of the processor of a board alone. The driver of the run stops at each `next_tick`.
 
     `sleeps`: it slept before `begin_tick`; None while that is not known. `late_cycles`: how long it had slept 30 ms (at
     24 MHz) before `end_tick`; -1 while that is not known.

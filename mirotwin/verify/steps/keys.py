@@ -51,19 +51,19 @@ class Step(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_only=True
     CHANGES: ClassVar[bool] = True
     """Whether later steps depend on this one."""
     NEEDS: ClassVar[Feature | None] = None
-    """Of the machine."""
+    """The feature of the machine that the step needs."""
 
     number: int = 0
     note: str = ""
 
     @property
     def needs(self) -> Feature | None:
-        """Of the machine, by all that the step says."""
+        """The feature of the machine that the step needs, by all its keys."""
         return self.NEEDS
 
     @property
     def network(self) -> int:
-        """Whose step it is: that of the key, or of the condition it waits for."""
+        """The network of the step: by its key, or by the condition that it waits for."""
         return getattr(self, "network_", None) or 0
 
     def problem(self, network: ScenarioNetwork) -> str:
@@ -452,7 +452,7 @@ PLAIN: dict[str, type[Step]] = {
     struct.VERB: struct
     for struct in (StreamStep, PauseStep, CheckStep, RadioStep, ResetStep, PowerStep, SaveStep)
 }
-"""Those whose table is read as it stands."""
+"""Steps whose table is read as it stands."""
 LOOKING: dict[str, type[ConditionStep]] = {
     "wait_for": WaitStep,
     "expect": WaitStep,
@@ -460,7 +460,7 @@ LOOKING: dict[str, type[ConditionStep]] = {
     "silence_for_ms": SilenceStep,
     "hold": HoldStep,
 }
-"""Those whose table holds the keys of a condition, too."""
+"""Steps whose table holds the keys of a condition, too."""
 VERBS = ("send", *LOOKING, *PLAIN)
 
 

@@ -36,7 +36,7 @@ def steps_of(scenario: Scenario, origin: str) -> list[Step]:
 
 
 def steps_in(text: ScenarioText) -> list[Step]:
-    """Those of a scenario that was read; an error names the setting that it concerns."""
+    """The steps of a scenario that was read; an error names the setting that it concerns."""
     try:
         return steps_of(text.scenario, text.origin)
     except ScenarioError as error:
