@@ -5,6 +5,7 @@ of which stay until its end. Each full collection would walk through them; a pyt
 """
 
 import gc
+import sys
 
 from hypothesis import HealthCheck, settings
 
@@ -22,3 +23,10 @@ def pytest_sessionstart():
 def pytest_collection_finish():
     gc.freeze()
     gc.enable()
+
+
+def pytest_runtest_teardown(item, nextitem):
+    """A command forgets the checks that it took from files with its process; here tests of many files share one."""
+    expect = sys.modules.get("mirotwin.verify.checks.expect")
+    if expect is not None and (nextitem is None or nextitem.path != item.path):
+        expect.CHECKS.in_files.clear()
