@@ -76,6 +76,6 @@ def shortened(text: str) -> str:
     return text if len(text) <= 2 * LONGEST_END else f"{text[:LONGEST_END]} .. {text[-LONGEST_END:]}"
 
 
-def amount(number: int | str, one: str, more: str = "") -> str:
-    """`1 frame`, `2 frames`; `more`: the plural that is not `one` with an s."""
-    return f"{number} {one if number == 1 else more or f'{one}s'}"
+def amount(number: int | str, singular: str, more: str = "") -> str:
+    """`1 frame`, `2 frames`; `more`: the plural that is not `singular` with an s."""
+    return f"{number} {singular if number == 1 else more or f'{singular}s'}"

@@ -95,7 +95,7 @@ def sincos(x: float) -> tuple[float, float]:
 
 
 def sincos_within(x: float) -> tuple[float, float]:
-    """`sincos` for whoever has seen that |x| < ANGLE_LIMIT."""
+    """`sincos` for a caller that has checked that |x| < ANGLE_LIMIT."""
     if x < 0.0:
         scaled = x * _INV_PIO2 - 0.5
     else:
@@ -261,7 +261,7 @@ def exp(x: float) -> float:
 
 
 def exp_within(x: float) -> float:
-    """`exp` for whoever has seen that x is a number up to 709."""
+    """`exp` for a caller that has checked that x is a number up to 709."""
     if x < _EXP_MIN:
         return 0.0
     if -0.34657359027997264 < x < 0.34657359027997264:  # ln 2 / 2
@@ -296,7 +296,7 @@ def log(x: float) -> float:
 
 
 def log_within(x: float) -> float:
-    """`log` for whoever has seen that x is finite and positive."""
+    """`log` for a caller that has checked that x is finite and positive."""
     k = 0
     # Products with 2 and 1/2 are exact: this is frexp without a look at the bits.
     while x < 0.5 * _SQRT2:

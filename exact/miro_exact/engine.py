@@ -34,8 +34,8 @@ REMEDY = "reinstall with `pip install -e .` (or `pip install .`), or run with `-
 class EngineError(BadInput, ImportError):  # type: ignore[misc]  # both have a `path`, which here is ""
     """A compiled module that does not belong to its source, or an engine that is not there."""
 
-    def __init__(self, what: str, remedy: str) -> None:
-        super().__init__("", "", what, remedy)
+    def __init__(self, reason: str, remedy: str) -> None:
+        super().__init__("", "", reason, remedy)
 
 
 # Sums of names: the compiler of the source would add literals. The subnormal is made from its bits, without arithmetic.
@@ -61,20 +61,20 @@ def check_arithmetic() -> None:
     subnormal = {"results (FTZ)": _SMALLEST * _QUARTER, "operands (DAZ)": _SUBNORMAL * _FOUR}
     flushed = [name for name, value in subnormal.items() if struct.pack("<d", value) == _ZERO]
     if mode:
-        what = f"the processor rounds {mode} and not to nearest"
+        reason = f"the processor rounds {mode} and not to nearest"
         remedy = "something in this process, a plug-in or a library, called fesetround: let it set FE_TONEAREST again"
     elif flushed:
-        what = f"the processor takes subnormal {' and '.join(flushed)} for zero"
+        reason = f"the processor takes subnormal {' and '.join(flushed)} for zero"
         remedy = (
             "something in this process, a plug-in or a library in LD_PRELOAD, was linked with -ffast-math:"
             " build it without, or leave it out"
         )
     elif _BIG + _ODD != 10000000000000002.0:
-        what = "this Python rounds sums of doubles twice (x87 arithmetic)"
+        reason = "this Python rounds sums of doubles twice (x87 arithmetic)"
         remedy = "use a 64-bit Python, or one that was built with -msse2 -mfpmath=sse"
     else:
         return
-    raise EngineError(f"{what}, so that runs would have other bits", remedy)
+    raise EngineError(f"{reason}, so that runs would have other bits", remedy)
 
 
 @cache
@@ -190,8 +190,8 @@ def select(engine: str) -> None:
     if engine == "compiled" and finder.missing():
         raise EngineError(f"no compiled module for {', '.join(finder.missing())}", REMEDY)
     if finder.engine not in (None, engine):
-        what = f"engine {finder.engine} is already in use in this process, cannot change to {engine}"
-        raise EngineError(what, "select the engine before anything else is imported")
+        reason = f"engine {finder.engine} is already in use in this process, cannot change to {engine}"
+        raise EngineError(reason, "select the engine before anything else is imported")
     finder.engine = engine
 
 

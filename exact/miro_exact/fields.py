@@ -50,14 +50,14 @@ class Kind:
     def encode(self, value: Any) -> bytes:
         raise NotImplementedError
 
-    def decode(self, data: bytes, at: int) -> tuple[Any, int]:
+    def decode(self, data: bytes, offset: int) -> tuple[Any, int]:
         raise NotImplementedError
 
 
-def _take(layout: struct.Struct, data: bytes, at: int) -> tuple[Any, ...]:
-    if at + layout.size > len(data):
-        raise ValueError(f"ends {at + layout.size - len(data)} bytes early")
-    return layout.unpack_from(data, at)
+def _take(layout: struct.Struct, data: bytes, offset: int) -> tuple[Any, ...]:
+    if offset + layout.size > len(data):
+        raise ValueError(f"ends {offset + layout.size - len(data)} bytes early")
+    return layout.unpack_from(data, offset)
 
 
 def out_of_range(value: Any, low: Any, high: Any) -> str:
@@ -111,11 +111,11 @@ class Number(Kind):
             _checked(values, (-INFINITY, INFINITY))
         return self.layout.pack(*values)
 
-    def decode(self, data: bytes, at: int) -> tuple[Any, int]:
-        values = _take(self.layout, data, at)
+    def decode(self, data: bytes, offset: int) -> tuple[Any, int]:
+        values = _take(self.layout, data, offset)
         if self.bounds is not None:
             _checked(values, self.bounds)
-        return values if self.count else values[0], at + self.layout.size
+        return values if self.count else values[0], offset + self.layout.size
 
 
 class Items(Kind):
@@ -137,7 +137,7 @@ class Items(Kind):
         self.made: type[Any] | None = None  # list or tuple, as the part has it
 
     def write(self, part: Any, name: str, value: Sequence[Any]) -> None:
-        if self.made is None:  # asked once: a property may have to make a list for the answer
+        if self.made is None:  # read once: a property may have to make a list for the answer
             self.made = type(getattr(part, name))
         setattr(part, name, self.made(value))
 
@@ -150,20 +150,20 @@ class Items(Kind):
             _checked(value, (-INFINITY, INFINITY))
         return struct.pack(f"<I{len(value)}{self.code}", len(value), *value)
 
-    def decode(self, data: bytes, at: int) -> tuple[list[Any], int]:
-        (count,) = _take(_COUNT, data, at)
+    def decode(self, data: bytes, offset: int) -> tuple[list[Any], int]:
+        (count,) = _take(_COUNT, data, offset)
         # Before `count` is believed: four damaged bytes must not ask for gigabytes.
         if count > self.room:
             raise ValueError(f"has {count} items, not at most {self.room}")
         if not count:
-            return [], at + 4
+            return [], offset + 4
         layout = struct.Struct(f"<{count}{self.code}")
-        values = _take(layout, data, at + 4)
+        values = _take(layout, data, offset + 4)
         if self.bounds is not None:
             _checked(values, self.bounds)
         if self.ordered and any(later <= earlier for earlier, later in pairwise(values)):
             raise ValueError("is not in order")
-        return list(values), at + 4 + layout.size
+        return list(values), offset + 4 + layout.size
 
 
 class Queue(Items):
@@ -201,23 +201,23 @@ class Octets(Kind):
         return bytes(getattr(part, name))
 
     def write(self, part: Any, name: str, value: bytes) -> None:
-        if isinstance(kept := getattr(part, name), bytearray):
+        if isinstance(present := getattr(part, name), bytearray):
             # In place, because others hold it.
-            kept[:] = value
+            present[:] = value
         else:
             setattr(part, name, value)
 
     def encode(self, value: bytes) -> bytes:
         return _COUNT.pack(len(value)) + value
 
-    def decode(self, data: bytes, at: int) -> tuple[bytes, int]:
-        (length,) = _take(_COUNT, data, at)
+    def decode(self, data: bytes, offset: int) -> tuple[bytes, int]:
+        (length,) = _take(_COUNT, data, offset)
         # The room first: a length that is too large is named as that, not as an early end.
         if length > self.room:
             raise ValueError(f"has {length} bytes, not at most {self.room}")
-        if at + 4 + length > len(data):
-            raise ValueError(f"ends {at + 4 + length - len(data)} bytes early")
-        return data[at + 4 : at + 4 + length], at + 4 + length
+        if offset + 4 + length > len(data):
+            raise ValueError(f"ends {offset + 4 + length - len(data)} bytes early")
+        return data[offset + 4 : offset + 4 + length], offset + 4 + length
 
 
 class Row(Kind):
@@ -253,18 +253,18 @@ class Row(Kind):
             return self.layout.pack(*cells)
         return b"".join([column.encode(cell) for column, cell in zip(self.columns, cells, strict=True)])
 
-    def decode(self, data: bytes, at: int) -> tuple[Any, int]:
+    def decode(self, data: bytes, offset: int) -> tuple[Any, int]:
         if self.layout is not None:
-            cells = _take(self.layout, data, at)
+            cells = _take(self.layout, data, offset)
             for index, low, high in self.bounded:
                 if not low <= cells[index] <= high:
                     raise ValueError(out_of_range(cells[index], low, high))
-            return cells if self.make is None else self.make(cells), at + self.layout.size
-        found = []
+            return cells if self.make is None else self.make(cells), offset + self.layout.size
+        row = []
         for column in self.columns:
-            cell, at = column.decode(data, at)
-            found.append(cell)
-        return tuple(found) if self.make is None else self.make(tuple(found)), at
+            cell, offset = column.decode(data, offset)
+            row.append(cell)
+        return tuple(row) if self.make is None else self.make(tuple(row)), offset
 
     def first(self, value: Any) -> Any:
         """The first column of a row."""
@@ -303,15 +303,15 @@ class Rows(Kind):
             raise ValueError(f"has {len(value)} rows, not at most {self.room}")
         return _COUNT.pack(len(value)) + b"".join([self.row.encode(row) for row in value])
 
-    def decode(self, data: bytes, at: int) -> tuple[list[Any], int]:
-        (count,) = _take(_COUNT, data, at)
+    def decode(self, data: bytes, offset: int) -> tuple[list[Any], int]:
+        (count,) = _take(_COUNT, data, offset)
         if count > self.room:
             raise ValueError(f"has {count} rows, not at most {self.room}")
         rows = []
-        at += 4
+        offset += 4
         for _ in range(count):
-            row, at = self.row.decode(data, at)
+            row, offset = self.row.decode(data, offset)
             rows.append(row)
         if self.ordered and any(self.row.first(b) < self.row.first(a) for a, b in pairwise(rows)):
             raise ValueError("is not in order")
-        return rows, at
+        return rows, offset

@@ -21,7 +21,7 @@ _CIMPORT = re.compile(r"^from (\S+) cimport ([^#\n]+)", re.MULTILINE)
 
 def hot_sources(package_dirs: dict[str, Path]) -> dict[str, Path]:
     """Dotted name -> source file of every hot module below the given package folders."""
-    found = {}
+    sources = {}
     for package, folder in package_dirs.items():
         root = len(os.fspath(folder))
         # quicker than `rglob`: every start of a program waits for it
@@ -31,8 +31,8 @@ def hot_sources(package_dirs: dict[str, Path]) -> dict[str, Path]:
             for stem in (name[:-4] for name in files if name.endswith(".pxd")):
                 for source in (f"{stem}.py", f"{stem}.pyx"):
                     if source in files:
-                        found[f"{within}.{stem}"] = Path(inner, source)
-    return dict(sorted(found.items()))
+                        sources[f"{within}.{stem}"] = Path(inner, source)
+    return dict(sorted(sources.items()))
 
 
 def source_hashes(package_dirs: dict[str, Path], sources: dict[str, Path]) -> dict[str, str]:
@@ -49,20 +49,20 @@ def source_hashes(package_dirs: dict[str, Path], sources: dict[str, Path]) -> di
     cimported = {name: _cimported(text, texts) for name, text in texts.items()}
     hashes = {}
     for name, source in sources.items():
-        found = hashlib.sha256(basis)
+        digest = hashlib.sha256(basis)
         for used in sorted(_layout(name, cimported)):
-            found.update(f"{used}\n".encode() + texts[used])
-        hashes[name] = hashlib.sha256(found.digest() + _text(source)).hexdigest()
+            digest.update(f"{used}\n".encode() + texts[used])
+        hashes[name] = hashlib.sha256(digest.digest() + _text(source)).hexdigest()
     return hashes
 
 
 def _cimported(text: bytes, texts: dict[str, bytes]) -> list[str]:
     """The hot modules, of those in `texts`, that this `.pxd` builds upon by itself."""
-    found: list[str] = []
+    used: list[str] = []
     for package, names in _CIMPORT.findall(text.decode()):
         modules = [package, *(f"{package}.{part.strip()}" for part in names.split(","))]
-        found += [module for module in modules if module in texts]
-    return found
+        used += [module for module in modules if module in texts]
+    return used
 
 
 def _layout(name: str, cimported: dict[str, list[str]]) -> set[str]:

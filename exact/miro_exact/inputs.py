@@ -29,8 +29,8 @@ _OF_PROCESSES = ("/dev/", "/proc/self/fd/")
 class InputError(BadInput):
     """A file that is not read: `path`, what, remedy."""
 
-    def __init__(self, path: str, what: str, remedy: str) -> None:
-        super().__init__(path, "", what, remedy)
+    def __init__(self, path: str, reason: str, remedy: str) -> None:
+        super().__init__(path, "", reason, remedy)
 
 
 def check_no_folder(path: str | os.PathLike[str], likely: str = "") -> None:
@@ -61,8 +61,8 @@ def path_beside(file: str | os.PathLike[str], name: str) -> str:
     except ValueError:  # a NUL, another drive
         inside = False
     if not inside:
-        what = f"{one_line(shortened(name))} lies outside of the folder of the file that names it"
-        raise InputError(str(file), what, "put it into that folder, or the file above both")
+        reason = f"{one_line(shortened(name))} lies outside of the folder of the file that names it"
+        raise InputError(str(file), reason, "put it into that folder, or the file above both")
     return path
 
 
@@ -115,32 +115,33 @@ def check_memory(path: str | os.PathLike[str], size: int) -> None:
     """Refuses a recording that would take more memory than there is: the system would end this program, or others."""
     available = available_bytes()
     if available is not None and size * RECORDING_NEEDS > available:
-        what = f"takes up to {_in_mb(size * RECORDING_NEEDS)} of memory to read, and {_in_mb(available)} are available"
-        raise InputError(str(path), what, "end other programs, or read it on a machine with more")
+        needed = _in_mb(size * RECORDING_NEEDS)
+        reason = f"takes up to {needed} of memory to read, and {_in_mb(available)} are available"
+        raise InputError(str(path), reason, "end other programs, or read it on a machine with more")
 
 
 def available_bytes() -> int | None:
     """Memory that this process may take yet: by the system, its control group and its limits; None if none says."""
-    found = []
+    amounts = []
     with suppress(OSError, KeyError, ValueError):
         lines = Path("/proc/meminfo").read_text(encoding="ascii").splitlines()
         kb = {name: int(value.split()[0]) for name, _, value in (line.partition(":") for line in lines)}
-        found.append((kb["MemAvailable"] + kb["SwapFree"]) << 10)
+        amounts.append((kb["MemAvailable"] + kb["SwapFree"]) << 10)
     with suppress(OSError, ValueError):
         inner = Path("/proc/self/cgroup").read_text(encoding="utf-8").rpartition("0::/")[2].strip()
         group = Path("/sys/fs/cgroup") / inner
         for folder in (group, *group.parents[: len(Path(inner).parts)]):
             with suppress(OSError, ValueError):  # "max", and the topmost group has no such files
                 limit, used = (int((folder / name).read_text()) for name in ("memory.max", "memory.current"))
-                found.append(limit - used)
+                amounts.append(limit - used)
     with suppress(ImportError, OSError, ValueError):
         import resource
 
         limit = resource.getrlimit(resource.RLIMIT_AS)[0]
         if limit != resource.RLIM_INFINITY:
             pages = int(Path("/proc/self/statm").read_text(encoding="ascii").split()[0])
-            found.append(limit - pages * resource.getpagesize())
-    return max(0, min(found)) if found else None
+            amounts.append(limit - pages * resource.getpagesize())
+    return max(0, min(amounts)) if amounts else None
 
 
 def _in_mb(size: int) -> str:

@@ -29,8 +29,8 @@ DIGITS = 12
 
 def entries_of(group: str, name: str | None = None) -> list[EntryPoint]:
     """The entry points of a group, all or those with this name."""
-    found = _registered(group, tuple((path, _changed_ns(path)) for path in sys.path))
-    return [entry for entry in found if name in (None, entry.name)]
+    entries = _registered(group, tuple((path, _changed_ns(path)) for path in sys.path))
+    return [entry for entry in entries if name in (None, entry.name)]
 
 
 def _changed_ns(path: str) -> int:
@@ -117,17 +117,17 @@ def sources_hash(entry: EntryPoint) -> str:
 
 def _sources(entry: EntryPoint) -> dict[str, Path]:
     """Path below the folder of a top-level module or package -> file."""
-    found: dict[str, Path] = {}
+    files: dict[str, Path] = {}
     with suppress(AttributeError):  # of an entry point that names no module
-        found |= _files_of_module(entry.module)
+        files |= _files_of_module(entry.module)
     if entry.dist is not None:
         for module in sorted(_top_level(entry.dist)):
-            found |= _files_of_module(module)
+            files |= _files_of_module(module)
         for folder in _editable_folders(entry.dist):
             for path in sorted(folder.iterdir()):
                 if _module(path.name, path.joinpath("__init__.py").is_file()):
-                    found |= _files(path.name, path)
-    return found
+                    files |= _files(path.name, path)
+    return files
 
 
 def _files_of_module(module: str) -> dict[str, Path]:
@@ -149,13 +149,13 @@ def _files(name: str, path: Path) -> dict[str, Path]:
     """The file, or all in the folder but for what Python and editors leave there."""
     if path.is_file():
         return {name: path}
-    found = {}
+    listed = {}
     for folder, folders, files in os.walk(path):
         folders[:] = [one for one in folders if one != "__pycache__" and not one.startswith(".")]
         for file in (Path(folder, one) for one in files if not one.startswith(".")):
             if file.is_file() and not file.name.endswith((".pyc", "~")):
-                found[f"{name}/{file.relative_to(path).as_posix()}"] = file
-    return found
+                listed[f"{name}/{file.relative_to(path).as_posix()}"] = file
+    return listed
 
 
 def _top_level(dist: Distribution) -> set[str]:

@@ -46,14 +46,14 @@ def fields_of(layout: str) -> dict[str, list[tuple[str, str, bool]]]:
     for alias, c_type in _ALIASES.items():
         layout = re.sub(rf"\b{alias}\b", c_type, layout)
     layout = re.sub(r" *#[^\n]*", "", layout)
-    found: dict[str, list[tuple[str, str, bool]]] = {}
+    fields: dict[str, list[tuple[str, str, bool]]] = {}
     for name, body in _CLASS.findall(layout):
-        found[name] = []
+        fields[name] = []
         for c_type, names in _FIELD.findall(body):
             for declared in names.split(","):
                 field, bracket, _ = declared.strip().partition("[")
-                found[name].append((field, c_type, bool(bracket)))
-    return found
+                fields[name].append((field, c_type, bool(bracket)))
+    return fields
 
 
 def text(layout: str) -> str:
@@ -77,7 +77,7 @@ def without_zeros(source: str, layout: str) -> str:
         for method in made.body:
             if isinstance(method, ast.FunctionDef) and method.name == "__init__":
                 for statement in method.body:
-                    found = _ZEROS.fullmatch(ast.unparse(statement))
-                    if found is not None and found[1] in arrays and statement.lineno == statement.end_lineno:
+                    match = _ZEROS.fullmatch(ast.unparse(statement))
+                    if match is not None and match[1] in arrays and statement.lineno == statement.end_lineno:
                         lines[statement.lineno - 1] = " " * statement.col_offset + "pass\n"
     return "".join(lines)

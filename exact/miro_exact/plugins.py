@@ -29,8 +29,8 @@ Plugin = TypeVar("Plugin")
 class PluginError(BadInput):
     """A plug-in that cannot be found, loaded or used: `what` and `remedy`."""
 
-    def __init__(self, what: str, remedy: str = "") -> None:
-        super().__init__("", "", what, remedy)
+    def __init__(self, reason: str, remedy: str = "") -> None:
+        super().__init__("", "", reason, remedy)
 
 
 class Registry(msgspec.Struct, Generic[Plugin], frozen=True, eq=False):
@@ -55,8 +55,8 @@ class Registry(msgspec.Struct, Generic[Plugin], frozen=True, eq=False):
 
     def names(self) -> list[str]:
         """All names that can be used: our own in the order of the table, then the others sorted."""
-        found = {*self.in_files, *(entry.name for entry in installed.entries_of(self.group))}
-        return [*self.own, *sorted(found.difference(self.own))]
+        names = {*self.in_files, *(entry.name for entry in installed.entries_of(self.group))}
+        return [*self.own, *sorted(names.difference(self.own))]
 
     def find(self, name: str) -> type[Plugin]:
         """The struct of parameters of the plug-in `name`. Raises PluginError with the reason in one line."""
@@ -72,11 +72,11 @@ class Registry(msgspec.Struct, Generic[Plugin], frozen=True, eq=False):
         owner = installed.owner(entry)
         entry_point = f"{entry.value}, from {owner}"
         try:
-            found = entry.load()
+            loaded = entry.load()
         except (Exception, SystemExit) as error:
-            what = f"{self.word} {name!r} ({entry_point}) cannot be imported: {raised(error)}"
-            raise PluginError(what, f"repair or uninstall {owner}") from error
-        return self._checked(found, name, entry_point)
+            reason = f"{self.word} {name!r} ({entry_point}) cannot be imported: {raised(error)}"
+            raise PluginError(reason, f"repair or uninstall {owner}") from error
+        return self._checked(loaded, name, entry_point)
 
     def of_file(self, path: str, name: str, option: str) -> type[Plugin]:
         """The struct `name` of a file in Python, which is run: `option` of the command line named it.
@@ -90,28 +90,28 @@ class Registry(msgspec.Struct, Generic[Plugin], frozen=True, eq=False):
             if isinstance(value, type) and issubclass(value, base) and value is not base
         }
         if name not in structs:
-            what = f"there is no class {name!r} derived from {base.__name__}"
+            reason = f"there is no class {name!r} derived from {base.__name__}"
             remedy = did_you_mean(name, list(structs), f"it has {', '.join(structs) or 'none'}")
-            raise BadInput(path, option, what, remedy)
+            raise BadInput(path, option, reason, remedy)
         struct: Any = structs[name]
         tag = struct.__struct_config__.tag
         if tag in self.own:
-            what = f"{self.word} {tag!r} is in mirotwin ({self.own[tag]}), too"
-            raise BadInput(path, f"{option} {name}", what, "give the class another tag")
+            reason = f"{self.word} {tag!r} is in mirotwin ({self.own[tag]}), too"
+            raise BadInput(path, f"{option} {name}", reason, "give the class another tag")
         return self._checked(struct, tag, f"{path}:{name}")
 
-    def _checked(self, found: Any, name: str, entry_point: str) -> type[Plugin]:
-        """`found` if it is a struct of parameters as this kind of plug-in needs it."""
+    def _checked(self, loaded: Any, name: str, entry_point: str) -> type[Plugin]:
+        """`loaded` if it is a struct of parameters as this kind of plug-in needs it."""
         found_as = f"{self.word} {name!r} ({entry_point})"
-        if not (isinstance(found, type) and issubclass(found, _loaded(self.base))):
+        if not (isinstance(loaded, type) and issubclass(loaded, _loaded(self.base))):
             raise PluginError(f"{found_as} is not a struct of parameters", f"derive it from {self.base}")
-        struct: Any = found
+        struct: Any = loaded
         config = struct.__struct_config__
         if config.tag != name or config.tag_field != self.key:
             raise PluginError(f"{found_as} has the tag {config.tag!r}", f"give the class tag={name!r}")
         if not (config.frozen and config.forbid_unknown_fields):
             raise PluginError(f"{found_as} can change, or takes unknown keys", "give the class frozen=True")
-        return found
+        return loaded
 
 
 def installed_part(group: str, word: str, name: str, own: str = "") -> Any:
@@ -123,8 +123,8 @@ def installed_part(group: str, word: str, name: str, own: str = "") -> Any:
     places = ([f"mirotwin ({own})"] if own else []) + [installed.place(entry) for entry in entries]
     if len(places) > 1:
         others = " or ".join(installed.owner(entry) for entry in entries)
-        what = f"{word} {name!r} is in {' and in '.join(places)}"
-        raise PluginError(what, f"uninstall {others}, or give one of them another name")
+        reason = f"{word} {name!r} is in {' and in '.join(places)}"
+        raise PluginError(reason, f"uninstall {others}, or give one of them another name")
     return entries[0] if entries else None
 
 

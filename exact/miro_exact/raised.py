@@ -28,9 +28,9 @@ def raised(error: BaseException) -> str:
     return at_place(described(error), raised_at(error) or _raised_by_ours(error))
 
 
-def at_place(what: str, place: str) -> str:
-    """`what` with the place, if that is known."""
-    return f"{what} ({place})" if place else what
+def at_place(text: str, place: str) -> str:
+    """`text` with the place, if that is known."""
+    return f"{text} ({place})" if place else text
 
 
 def raised_at(error: BaseException) -> str:

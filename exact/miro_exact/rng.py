@@ -218,15 +218,15 @@ def half_normal_table() -> list[int]:
     In integers with 128 fraction bits, from P(|z| < x) = 2 phi(x) (x + x^3/3 + x^5/15 + ..) (Marsaglia
     2004), a series without cancellation; 1/phi(x) = sqrt(2 pi) exp(x^2/2) grows by exp((2k + 1)/512) after entry k.
     """
-    one = 1 << 128
+    unit = 1 << 128
     root = 0x281B263FEC4E0B2CAF9483F5CE459DC5F  # floor(2^128 sqrt(2 pi))
-    growth, ratio = one, 0x100802005560011127D41D5BD72F4C8F3  # exp(1/512)
+    growth, ratio = unit, 0x100802005560011127D41D5BD72F4C8F3  # exp(1/512)
     table = []
     area_63 = k = 0
     while area_63 < 1 << 63:
         table.append(area_63)
         k += 1
-        odd = k * one // 16
+        odd = k * unit // 16
         area = 0
         n = 1
         while odd:
@@ -235,7 +235,7 @@ def half_normal_table() -> list[int]:
             odd = odd * k * k // (256 * n)
         growth = growth * ratio >> 128  # exp(x^2/2)
         ratio = ratio * 0x10100802AB55777D28A2A42D26AA9EE67 >> 128  # times exp(1/256)
-        area_63 = ((2 * area * one // root) * one // growth + (1 << 64)) >> 65
+        area_63 = ((2 * area * unit // root) * unit // growth + (1 << 64)) >> 65
     return [*table, area_63]
 
 

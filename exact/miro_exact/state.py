@@ -76,10 +76,10 @@ class StateField(NamedTuple):
 
 def table(cls: type) -> dict[str, Any]:
     """Name -> kind of every field of a class, base classes first, as declared."""
-    found: dict[str, Any] = {}
+    kinds: dict[str, Any] = {}
     for base in reversed(cls.__mro__):
-        found.update(base.__dict__.get("STATE", {}))
-    return found
+        kinds.update(base.__dict__.get("STATE", {}))
+    return kinds
 
 
 @cache
@@ -143,14 +143,14 @@ class One:
         except ValueError as error:
             raise DomainError(f"{self.field.path} {error}") from None
 
-    def check(self, data: bytes, at: int) -> int:
+    def check(self, data: bytes, offset: int) -> int:
         try:
-            self.value, at = self.kind.decode(data, at)
+            self.value, offset = self.kind.decode(data, offset)
         except ValueError as error:
             raise ValueError(f"{self.field.path} {error}") from None
         if self.sibling is not None and len(self.value) != len(self.sibling.value):
             raise ValueError(f"{self.field.path} has {len(self.value)} items, not {len(self.sibling.value)}")
-        return at
+        return offset
 
     def put(self) -> None:
         self.kind.write(self.part, self.name, self.value)
@@ -220,10 +220,10 @@ class Flat:
 
     def decode(self, data: bytes) -> dict[str, Any]:
         """Path -> value of every field in the bytes of a state. Raises ValueError as `load` does."""
-        values, at = {}, 0
+        values, offset = {}, 0
         for field in self.fields:
             try:
-                values[field.path], at = field.kind.decode(data, at)
+                values[field.path], offset = field.kind.decode(data, offset)
             except ValueError as error:
                 raise ValueError(f"{field.path} {error}") from None
         return values
@@ -236,12 +236,12 @@ class Flat:
         return self._tables
 
     def _check(self, data: bytes) -> None:
-        at = 0
+        offset = 0
         for block in self._blocks:
-            at = block.check(data, at)
+            offset = block.check(data, offset)
         # Checked after the last block: what is too long would be read as far as it goes.
-        if at != len(data):
-            raise ValueError(f"the state has {len(data)} bytes, not {at}")
+        if offset != len(data):
+            raise ValueError(f"the state has {len(data)} bytes, not {offset}")
 
     def _put(self) -> None:
         for step in self._steps:
@@ -315,7 +315,7 @@ def _layout(part: Any, fields: list[tuple[str, Kind]], places: dict[str, tuple[i
     """What `memory.pyx` has to know of a group. Raises TypeError if table and C layout do not agree."""
     from miro_exact.memory import Layout
 
-    found: list[tuple[object, ...]] = []
+    rows: list[tuple[object, ...]] = []
     for name, kind in fields:
         assert isinstance(kind, (Number, Queue))
         address, c_type, size = places[name]
@@ -323,12 +323,12 @@ def _layout(part: Any, fields: list[tuple[str, Kind]], places: dict[str, tuple[i
         # Fields are copied by address: a width that is wrong would take a neighbour's bytes along.
         fits = CODES.get(c_type) == kind.code and size == count * calcsize(f"<{kind.code}")
         if not fits or (kind.bounds and kind.code not in "iqBd"):
-            what = f"{c_type} of {size} bytes is declared as {count} {kind.code}"
-            raise TypeError(f"{type(part).__name__}.{name}: {what}")
+            problem = f"{c_type} of {size} bytes is declared as {count} {kind.code}"
+            raise TypeError(f"{type(part).__name__}.{name}: {problem}")
         low, high = kind.bounds or (None, None)
         end = (places[kind.end][0], places[kind.end][2]) if isinstance(kind, Queue) else None
-        found.append((name, address, size // count, count, kind.code, low, high, end))
-    return Layout(part, found)
+        rows.append((name, address, size // count, count, kind.code, low, high, end))
+    return Layout(part, rows)
 
 
 # ---- blocks
@@ -339,21 +339,21 @@ def _blocks(pieces: list[Piece]) -> list[tuple[Any, bool]]:
 
     A block is a `One` or a `memory.Memory`: neighbouring fields with `pack`, `check` and `put`.
     """
-    found: list[tuple[Any, bool]] = []
+    blocks: list[tuple[Any, bool]] = []
     for (is_compiled, counts), group in groupby(
-        pieces, lambda one: (one.group.layout is not None, one.counts)
+        pieces, lambda item: (item.group.layout is not None, item.counts)
     ):
         if is_compiled:
             from miro_exact.memory import Memory
 
-            found.append(
+            blocks.append(
                 (Memory([(piece.part, piece.prefix, piece.group.layout) for piece in group]), counts)
             )
             continue
         for (field,) in map(Piece.fields, group):
             # Not found[-1]: compiled code does not index from the end.
-            found.append((One(field, found[len(found) - 1][0] if found else None), counts))
-    return found
+            blocks.append((One(field, blocks[len(blocks) - 1][0] if blocks else None), counts))
+    return blocks
 
 
 def _together(blocks: list[Any]) -> list[Any]:

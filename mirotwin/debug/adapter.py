@@ -135,16 +135,16 @@ class Adapter:
             raise BadInput(
                 "", "launch", "the token is not the one that was printed", 'add "token" to launch.json'
             )
-        debugger, said, why = open_subject(launched(given), everyone=True)
+        debugger, notes, why = open_subject(launched(given), everyone=True)
         self.use(debugger)
 
         def begin() -> None:
-            for line in said:
+            for line in notes:
                 self._event("output", category="important", output=line + "\n")
             if given.get("stopOnEntry", True) is False:
                 self._go("continue", False)
             else:
-                self._stopped(self._at_first_line(why), "\n".join(said))
+                self._stopped(self._at_first_line(why), "\n".join(notes))
 
         self.begin = begin
 
@@ -152,8 +152,8 @@ class Adapter:
         """Goes on from reset to the first line of C: an editor shows nothing of what is before. Why it stopped."""
         if why != "begin" or self.timeline.tick or not self.symbols.line_begins:
             return why
-        found = self.its.move("step")
-        return why if found == STEPPED else found
+        reason = self.its.move("step")
+        return why if reason == STEPPED else reason
 
     def use(self, debugger: Debugger) -> None:
         """From now on it answers for this one."""
@@ -178,50 +178,53 @@ class Adapter:
 
     def on_setBreakpoints(self, given: Message) -> Message:
         path = given["source"].get("path") or given["source"].get("name") or ""
-        return self._set(f"breakpoint in {path}", given, lambda one: f"{path}:{one['line']:d}")
+        return self._set(f"breakpoint in {path}", given, lambda item: f"{path}:{item['line']:d}")
 
     def on_setFunctionBreakpoints(self, given: Message) -> Message:
-        return self._set("function breakpoint", given, lambda one: one["name"])
+        return self._set("function breakpoint", given, lambda item: item["name"])
 
     def on_setInstructionBreakpoints(self, given: Message) -> Message:
-        def place(one: Message) -> str:
-            return f"{int(one['instructionReference'], 16) + one.get('offset', 0):#x}"
+        def place(item: Message) -> str:
+            return f"{int(item['instructionReference'], 16) + item.get('offset', 0):#x}"
 
         return self._set("instruction breakpoint", given, place)
 
     def on_setDataBreakpoints(self, given: Message) -> Message:
-        return self._set("data breakpoint", given, lambda one: one["dataId"])
+        return self._set("data breakpoint", given, lambda item: item["dataId"])
 
     def on_setExceptionBreakpoints(self, given: Message) -> Message:
         return {"breakpoints": []}  # some clients send it, though there is none to choose
 
     def _set(self, kind: str, given: Message, place: Callable[[Message], str]) -> Message:
         """All breakpoints of a kind, which replace those before."""
-        self.its.breakpoints[:] = [one for one in self.its.breakpoints if one.kind != kind]
+        self.its.breakpoints[:] = [item for item in self.its.breakpoints if item.kind != kind]
         self.its.changed = True
-        found = []
-        for one in given.get("breakpoints") or ():
-            asked = one.get("condition") or "", one.get("hitCondition") or ""
+        replies = []
+        for item in given.get("breakpoints") or ():
+            conditions = item.get("condition") or "", item.get("hitCondition") or ""
             try:
-                where = place(one)
-                log = _logged(one["logMessage"]) if one.get("logMessage") else None
-                if one.get("accessType", "write") != "write":
+                where = place(item)
+                log = _logged(item["logMessage"]) if item.get("logMessage") else None
+                if item.get("accessType", "write") != "write":
                     raise ValueError("only what is written can be stopped at")
                 if kind == "data breakpoint":
-                    made = self._watched(where, *asked)
+                    made = self._watched(where, *conditions)
                 else:
-                    made = self.its.add(where, *asked)
+                    made = self.its.add(where, *conditions)
             except _UNUSABLE as error:
-                found.append({"verified": False, "message": str(error)})
+                replies.append({"verified": False, "message": str(error)})
                 continue
             made.kind, made.log = kind, log
-            at: Message = {"verified": True, "id": made.number, "message": made.note or None}
+            reply: Message = {"verified": True, "id": made.number, "message": made.note or None}
             if made.written is None:
                 first = min(made.addresses)
                 line = self.symbols.line(first)
-                at |= {"instructionReference": f"{first:#06x}", "line": None if line is None else line.line}
-            found.append(at)
-        return {"breakpoints": found}
+                reply |= {
+                    "instructionReference": f"{first:#06x}",
+                    "line": None if line is None else line.line,
+                }
+            replies.append(reply)
+        return {"breakpoints": replies}
 
     def _watched(self, data: str, condition: str, count: str) -> Breakpoint:
         """A data breakpoint by its `dataId`: a name, or for what has none the place in this run."""
@@ -285,10 +288,10 @@ class Adapter:
         self.run_after = self.run_after or partial(self._stopped, "interrupted")
 
     def _thread(self, given: Message) -> int:
-        threads, asked = range(1, len(self.timeline.cores) + 1), given["threadId"]
-        if asked not in threads:
-            raise BadInput("", f"thread {asked}", "there is no such robot")
-        return threads.index(asked)
+        threads, number = range(1, len(self.timeline.cores) + 1), given["threadId"]
+        if number not in threads:
+            raise BadInput("", f"thread {number}", "there is no such robot")
+        return threads.index(number)
 
     def _go(self, verb: str, by_instruction: bool) -> None:
         self.paused = False
@@ -343,19 +346,19 @@ class Adapter:
     def on_stackTrace(self, given: Message) -> Message:
         thread = self._thread(given)
         frames = self._moment(thread * _MOST_FRAMES + 1).frames()
-        found: list[Message] = []
+        replies: list[Message] = []
         for identity, frame in enumerate(frames, thread * _MOST_FRAMES + 1):
             name = self.symbols.function(frame.place) + (" (interrupt)" if frame.by_interrupt else "")
             nowhere = {"line": 0, "column": 0, "presentationHint": "subtle"}
             where = {"column": 1, **place} if (place := self._place(frame.place, "source")) else nowhere
             next_one = f"{frame.pc:#06x}"
-            found.append({"id": identity, "name": name, **where, "instructionPointerReference": next_one})
+            replies.append({"id": identity, "name": name, **where, "instructionPointerReference": next_one})
         if not frames[-1].known:
             label = {"id": 0, "name": "the stack cannot be told from here on", "presentationHint": "label"}
-            found.append({**label, "line": 0, "column": 0})
+            replies.append({**label, "line": 0, "column": 0})
         first = given.get("startFrame") or 0
-        last = first + (given.get("levels") or len(found))
-        return {"stackFrames": found[first:last], "totalFrames": len(found)}
+        last = first + (given.get("levels") or len(replies))
+        return {"stackFrames": replies[first:last], "totalFrames": len(replies)}
 
     def _place(self, address: int, key: str) -> Message:
         """The source and the line of an instruction; nothing where none is known."""
@@ -374,16 +377,16 @@ class Adapter:
             raise BadInput("", f"frame {frame_id}", "is of a moment that is left") from None
 
     def on_scopes(self, given: Message) -> Message:
-        found = []
+        scopes = []
         for title, hint, values in self._scopes(self._moment(given["frameId"])):
             path = (
                 f"{title.removeprefix('Statics of ').removesuffix('.c')}:"
                 if title.startswith("Statics")
                 else ""
             )
-            kept = {"variablesReference": self._kept(values, path), "expensive": False}
-            found.append({"name": title, "presentationHint": hint, **kept})
-        return {"scopes": found}
+            reference = {"variablesReference": self._reference_to(values, path), "expensive": False}
+            scopes.append({"name": title, "presentationHint": hint, **reference})
+        return {"scopes": scopes}
 
     def _scopes(self, moment: Moment) -> Iterator[tuple[str, str | None, Iterable[tuple[str, Shown]]]]:
         """Title, hint of the protocol, and values."""
@@ -401,8 +404,8 @@ class Adapter:
             yield "Radio", None, self._radio()
         yield "Pins", None, children(moment.find("pins", ""))
 
-    def _kept(self, values: Iterable[tuple[str, Shown]], path: str = "") -> int:
-        """The reference by which these are asked for until the next stop. `path`: the expression before their names."""
+    def _reference_to(self, values: Iterable[tuple[str, Shown]], path: str = "") -> int:
+        """The reference by which a client requests these until the next stop. `path`: the expression before a name."""
         self.children.append((dict(values), path))
         return len(self.children)
 
@@ -435,7 +438,7 @@ class Adapter:
             place = f"{thread}:{value.space}:{value.address:#x}"
         return {
             key: text + (f"   ({value.note})" if value.note else ""),
-            "variablesReference": self._kept(inner, path) if inner else 0,
+            "variablesReference": self._reference_to(inner, path) if inner else 0,
             "type": None if value.kind is None else str(value.kind),
             "memoryReference": place,
         }
@@ -447,9 +450,11 @@ class Adapter:
             return self._shown(lambda: value, text, "result")
         there, self.paused, self.console.why = self.its.breakpoints[:], False, ""
         self.console.do(text)
-        for one in there:
-            if one.kind and one not in self.its.breakpoints:
-                self._event("breakpoint", reason="removed", breakpoint={"id": one.number, "verified": False})
+        for breakpoint in there:
+            if breakpoint.kind and breakpoint not in self.its.breakpoints:
+                self._event(
+                    "breakpoint", reason="removed", breakpoint={"id": breakpoint.number, "verified": False}
+                )
         if self.console.why:
             self.run_after = partial(self._stopped, self.console.why)
         if self.console.ended:
@@ -472,9 +477,9 @@ class Adapter:
 
     def on_disassemble(self, given: Message) -> Message:
         address = int(given["memoryReference"], 16) + (given.get("offset") or 0)
-        at = bisect.bisect_left(self.symbols.listing, address, key=attrgetter("address"))
-        at += given.get("instructionOffset") or 0
-        wanted = range(at, at + min(given["instructionCount"], SIZES["code"]))
+        first = bisect.bisect_left(self.symbols.listing, address, key=attrgetter("address"))
+        first += given.get("instructionOffset") or 0
+        wanted = range(first, first + min(given["instructionCount"], SIZES["code"]))
         return {"instructions": [self._instruction(index) for index in wanted]}
 
     def _instruction(self, index: int) -> Message:
@@ -506,4 +511,4 @@ def _logged(text: str) -> Callable[[Moment], str]:
         except BadInput as error:
             return f"<{error}>"
 
-    return lambda moment: _IN_BRACES.sub(lambda found: value(terms[found[1]], moment), text)
+    return lambda moment: _IN_BRACES.sub(lambda match: value(terms[match[1]], moment), text)

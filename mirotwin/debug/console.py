@@ -97,8 +97,8 @@ class Console(Cmd):
         finally:
             signal.signal(signal.SIGINT, before)
             self.interrupted = bool(stopped)
-            for told in self.lines:
-                show_line(told)
+            for output in self.lines:
+                show_line(output)
         return self.ended
 
     def postcmd(self, stop: bool, line: str) -> bool:
@@ -129,7 +129,7 @@ class Console(Cmd):
     # Moving
 
     def say(self, why: str) -> None:
-        """What logs told, where it stands, and why."""
+        """Shows the output of logs, where the debugger stands, and why."""
         self.frame, self.why = 0, why
         for cycle, core, text, address in self.debugger.told:
             self.tell(f"{self.time(cycle * CYCLE_TICKS, core)}{self.symbols.place(address)}: {text}")
@@ -181,18 +181,18 @@ class Console(Cmd):
 
     def _break(self, rest: str) -> None:
         if not rest:
-            for one in self.debugger.breakpoints:
-                self.tell(f"{one.number}  {one.text}")
+            for breakpoint in self.debugger.breakpoints:
+                self.tell(f"{breakpoint.number}  {breakpoint.text}")
             return
         place, _, condition = (part.strip() for part in rest.partition(" if "))
-        one = self.debugger.add(place, condition)
-        note = f" ({one.note})" if one.note else ""
-        self.tell(f"breakpoint {one.number}: {self.symbols.place(min(one.addresses))}{note}")
+        breakpoint = self.debugger.add(place, condition)
+        note = f" ({breakpoint.note})" if breakpoint.note else ""
+        self.tell(f"breakpoint {breakpoint.number}: {self.symbols.place(min(breakpoint.addresses))}{note}")
 
     def _watch(self, rest: str) -> None:
         name, _, condition = (part.strip() for part in rest.partition(" if "))
-        one = self.debugger.watch(name, condition)
-        self.tell(f"breakpoint {one.number}: before {name} is written")
+        breakpoint = self.debugger.watch(name, condition)
+        self.tell(f"breakpoint {breakpoint.number}: before {name} is written")
 
     def _delete(self, rest: str) -> None:
         there = self.debugger.breakpoints
@@ -211,18 +211,18 @@ class Console(Cmd):
         self._show(frames, self.frame)
 
     def _who(self, rest: str) -> None:
-        found = self.debugger.last_writer(self.debugger.bytes_of(rest))
-        if found is None:
+        writer = self.debugger.last_writer(self.debugger.bytes_of(rest))
+        if writer is None:
             self.tell(f"nothing wrote {rest} before")
         else:
-            self.tell(f"{self.time(found[0], self.timeline.focus)}{rest} was last written by")
-            self._show(found[1])
+            self.tell(f"{self.time(writer[0], self.timeline.focus)}{rest} was last written by")
+            self._show(writer[1])
 
     def _show(self, frames: list[StackFrame], chosen: int = -1) -> None:
         """One line a frame, the innermost first."""
-        for at, frame in enumerate(frames):
+        for index, frame in enumerate(frames):
             how = "  <- interrupt" if frame.by_interrupt else ""
-            self.tell(f"{'*' if at == chosen else ' '}#{at}  {self.symbols.place(frame.place)}{how}")
+            self.tell(f"{'*' if index == chosen else ' '}#{index}  {self.symbols.place(frame.place)}{how}")
         if not frames[-1].known:
             self.tell("    the stack cannot be told from here on")
 
@@ -236,18 +236,22 @@ class Console(Cmd):
         line = self.symbols.line(address)
         path = None if line is None else self.symbols.sources.path(line.file)
         if line is not None and path is not None:
-            asked = rest.rpartition(":")[2]
-            middle = int(asked) if ":" in rest and asked.isdecimal() else line.line
+            wanted = rest.rpartition(":")[2]
+            middle = int(wanted) if ":" in rest and wanted.isdecimal() else line.line
             rows = enumerate(path.read_text(errors="replace").splitlines(), 1)
-            shown = [(at, f"{at:4}  {text}") for at, text in rows if abs(at - middle) <= LINES_AROUND]
+            shown = [
+                (number, f"{number:4}  {text}")
+                for number, text in rows
+                if abs(number - middle) <= LINES_AROUND
+            ]
             stands = self.symbols.line(here)
             marked = stands.line if stands is not None and stands.file == line.file else -1
         else:
             shown = [(row.address, f"{row.address:#06x}  {row.text}") for row in self.symbols.listing]
             shown = [row for row in shown if row[0] >= address][: 2 * LINES_AROUND]
             marked = here
-        for at, text in shown:
-            self.tell(f"{'=>' if at == marked else '  '} {text}")
+        for number, text in shown:
+            self.tell(f"{'=>' if number == marked else '  '} {text}")
 
     def _help(self, rest: str) -> None:
         for verb, text in VERBS.items():
@@ -267,8 +271,8 @@ def _lines_of(name: str, value: Value) -> Iterator[str]:
             yield from _lines_of(f"{name}.{part}", get())
 
 
-def shown_value(found: Any) -> str:
+def shown_value(shown: Any) -> str:
     """A number as one reads it: small ones alone, larger ones in hex too."""
-    if isinstance(found, bool) or not isinstance(found, int) or -10 < found < 10:
-        return str(found)
-    return f"{found} ({found:#x})"
+    if isinstance(shown, bool) or not isinstance(shown, int) or -10 < shown < 10:
+        return str(shown)
+    return f"{shown} ({shown:#x})"

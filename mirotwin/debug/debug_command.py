@@ -56,10 +56,10 @@ def debug(options: DebugOptions) -> int:
         with redirect_stdout(sys.stderr):  # what anything prints must not get between the messages
             source = os.fdopen(_stdin("connect to --listen").fileno(), "rb", closefd=False)
             return _serve(Wire(source, sink))
-    debugger, said, why = open_subject(options)
+    debugger, notes, why = open_subject(options)
     console = Console(debugger)
     console.say(why)
-    for line in (*said, *console.lines):
+    for line in (*notes, *console.lines):
         show_line(line)
     if not options.commands:
         return _interact(console)

@@ -38,7 +38,7 @@ class Breakpoint(msgspec.Struct, eq=False):
     """Stops, or with `log` tells something, before an instruction at one of `addresses`: where `condition` is true,
     `written` is written, and `count` fits how often that was so since the run began.
 
-    `text`: as one asks for it; `note`: what is to be told about its place; `kind`: an editor's, which it sets together.
+    `text`: as it was entered; `note`: a remark on its place; `kind`: an editor's, which it sets together.
     `hits`: those that are counted, up to `counted_to`; each a number that grows with its cycle and its processor.
     """
 
@@ -77,7 +77,7 @@ class Debugger:
     """Of one run. `everyone`: breakpoints are for all processors, else for the one in focus.
 
     `changed`: set by who changes breakpoints while it searches, which then goes on with them.
-    What stops is told as a text: "breakpoint 1", "step", "the run ends here".
+    What stopped it is returned as a text: "breakpoint 1", "step", "the run ends here".
     """
 
     def __init__(self, timeline: Timeline, symbols: Symbols, everyone: bool = False) -> None:
@@ -88,7 +88,7 @@ class Debugger:
         self.told: list[LogOutput] = []
         self.changed = False
         self._numbers = 0
-        self._told_there: list[LogOutput] = []
+        self._reported_there: list[LogOutput] = []
         self._stopped_at: Position = (-1, 0)
 
     # Where it stands
@@ -117,11 +117,11 @@ class Debugger:
 
     def _refuse_unknown(self, condition: str, addresses: Collection[int]) -> None:
         """Raises NoValue for a condition that has no value at any of the addresses: it would never be true."""
-        for at, address in enumerate(addresses, 1):
+        for count, address in enumerate(addresses, 1):
             try:
                 return self.moment().refuse(condition, address)
             except NoValue:
-                if at == len(addresses):
+                if count == len(addresses):
                     raise
 
     def watch(
@@ -167,8 +167,8 @@ class Debugger:
             return self.timeline.everywhere
         first, last = self.symbols.image.symbols.stack
         on_stack = written.first <= last and written.end > first
-        found = written.writers(self.symbols.image.code, self.symbols.instructions, on_stack)
-        return found | self.symbols.unwinder.vectors if written.space == "iram" and on_stack else found
+        writers = written.writers(self.symbols.image.code, self.symbols.instructions, on_stack)
+        return writers | self.symbols.unwinder.vectors if written.space == "iram" and on_stack else writers
 
     def _writes(self, written: Bytes, cpu: Cpu) -> bool:
         """Whether the next instruction writes it, or the hardware's call of a routine has just done."""
@@ -198,49 +198,49 @@ class Debugger:
             traps[self.timeline.focus] = Trap(places.union(step.addresses), ask)
         return traps
 
-    def _is_met(self, one: Breakpoint, core: Core) -> bool:
-        if one.written is not None and not self._writes(one.written, core.cpu):
+    def _is_met(self, breakpoint: Breakpoint, core: Core) -> bool:
+        if breakpoint.written is not None and not self._writes(breakpoint.written, core.cpu):
             return False
-        if one.condition is None:
+        if breakpoint.condition is None:
             return True
         with suppress(BadInput):  # where it has no value, it is not true
-            return bool(number(one.condition(Moment(self.symbols, core))))
+            return bool(number(breakpoint.condition(Moment(self.symbols, core))))
         return False
 
-    def _stops(self, one: Breakpoint, core: Core) -> bool:
-        if not self._is_met(one, core):
+    def _stops(self, breakpoint: Breakpoint, core: Core) -> bool:
+        if not self._is_met(breakpoint, core):
             return False
-        at = (core.cpu.cycles, self.timeline.cores.index(core))
-        if one.count is not None:
-            hit = self._numbered(at)
-            if not one.hits or hit > one.hits[-1]:
-                one.hits.append(hit)
-            if not one.count(bisect.bisect_left(one.hits, hit) + 1):
+        position = (core.cpu.cycles, self.timeline.cores.index(core))
+        if breakpoint.count is not None:
+            hit = self._numbered(position)
+            if not breakpoint.hits or hit > breakpoint.hits[-1]:
+                breakpoint.hits.append(hit)
+            if not breakpoint.count(bisect.bisect_left(breakpoint.hits, hit) + 1):
                 return False
-        if one.log is not None:
-            self.told.append(LogOutput(*at, one.log(Moment(self.symbols, core)), core.cpu.pc))
-        return one.log is None
+        if breakpoint.log is not None:
+            self.told.append(LogOutput(*position, breakpoint.log(Moment(self.symbols, core)), core.cpu.pc))
+        return breakpoint.log is None
 
     def _count_hits(self) -> bool:
         """Counts the hits from the start of the run up to now, where a breakpoint asks for their number.
 
         False where that was interrupted.
         """
-        for one in self.breakpoints:
-            if one.count is not None and one.counted_to < self.timeline.tick:
-                ask = Trap(one.addresses, lambda core, one=one: self._is_met(one, core) or None)  # type: ignore[misc]
+        for point in self.breakpoints:
+            if point.count is not None and point.counted_to < self.timeline.tick:
+                ask = Trap(point.addresses, lambda core, point=point: self._is_met(point, core) or None)  # type: ignore[misc]
                 with self.timeline.staying():
-                    found = self.timeline.hits_back(dict.fromkeys(self._traps(), ask))
-                    hits = array("q", (self._numbered(hit[:2]) for hit in found))
+                    positions = self.timeline.hits_back(dict.fromkeys(self._traps(), ask))
+                    hits = array("q", (self._numbered(hit[:2]) for hit in positions))
                     whole = self.timeline.at_begin
                 if not whole:
                     return False
-                one.hits, one.counted_to = hits[::-1], self.timeline.tick
+                point.hits, point.counted_to = hits[::-1], self.timeline.tick
         return True
 
-    def _numbered(self, at: Position) -> int:
+    def _numbered(self, position: Position) -> int:
         """Eight bytes for each of millions of hits."""
-        return at[0] * len(self.timeline.cores) + at[1]
+        return position[0] * len(self.timeline.cores) + position[1]
 
     # Moving
 
@@ -283,19 +283,19 @@ class Debugger:
                 self.changed = False
                 if self._count_hits():
                     hit = seek(self._traps(step), here)
-                    for one in self.breakpoints:
-                        one.counted_to = max(one.counted_to, self.timeline.tick)
+                    for breakpoint in self.breakpoints:
+                        breakpoint.counted_to = max(breakpoint.counted_to, self.timeline.tick)
         return hit
 
     def _forward(self, step: Trap | None = None) -> str:
         self.told.clear()
-        here, known = self.timeline.here, self._told_there
+        here, known = self.timeline.here, self._reported_there
         hit = self._search(self.timeline.find, step)
-        told = sorted(one for one in self.told if one[:2] != here or one not in known)
-        self.told = [one for one in told if hit is None or one[:2] <= hit[:2]]
+        outputs = sorted(output for output in self.told if output[:2] != here or output not in known)
+        self.told = [output for output in outputs if hit is None or output[:2] <= hit[:2]]
         if hit is None:
             return self._at_end() or INTERRUPTED
-        self._told_there = [one for one in self.told if one[:2] == hit[:2]]
+        self._reported_there = [output for output in self.told if output[:2] == hit[:2]]
         self._stopped_at = hit[:2]
         return _named(hit)
 
@@ -344,8 +344,8 @@ class Debugger:
     def _caller(self) -> tuple[StackFrame, StackFrame]:
         frames = self.frames()
         if len(frames) < 2:
-            what = "nothing called this function" if frames[0].known else "the stack cannot be told here"
-            raise BadInput("", "finish", what, "step by instruction, or go to a place: `break`, `continue`")
+            reason = "nothing called this function" if frames[0].known else "the stack cannot be told here"
+            raise BadInput("", "finish", reason, "step by instruction, or go to a place: `break`, `continue`")
         return frames[0], frames[1]
 
     def _out(self) -> str:

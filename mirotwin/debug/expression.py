@@ -33,12 +33,12 @@ _GENERIC = {0x00: "xram", 0x40: "iram", 0x60: "xram", 0x80: "code"}
 class NoValue(BadInput):
     """An expression that cannot be read, or has no value here."""
 
-    def __init__(self, what: str, remedy: str = "") -> None:
-        super().__init__("", "", what, remedy)
+    def __init__(self, reason: str, remedy: str = "") -> None:
+        super().__init__("", "", reason, remedy)
 
 
 class Lookup(Protocol):
-    """What an expression is asked at: a processor that stands somewhere (`symbols.Moment`)."""
+    """Where an expression is evaluated: at a processor that stands somewhere (`symbols.Moment`)."""
 
     def find(self, name: str, module: str) -> Value:
         """The meaning of a name; `module`: the file that is named before it. Raises NoValue."""
@@ -98,10 +98,10 @@ def number(value: Value) -> Any:
     """The value as a single number; of an array its address. Raises NoValue."""
     if value.kind is not None and value.kind.kind == "array":
         return value.address
-    found = content(value)
-    if not isinstance(found, int | float):
+    result = content(value)
+    if not isinstance(result, int | float):
         raise NoValue("is no single number", "name one of its members or elements")
-    return found
+    return result
 
 
 def children(value: Value) -> list[tuple[str, Callable[[], Value]]]:
@@ -189,13 +189,13 @@ def _applied(apply: Callable[..., Any], sign: str, *terms: Term) -> Term:
 
     def applied(moment: Lookup) -> Value:
         try:
-            found = apply(*(number(term(moment)) for term in terms))
-            float(found)  # so that numbers do not grow without end
+            result = apply(*(number(term(moment)) for term in terms))
+            float(result)  # so that numbers do not grow without end
         except TypeError:
             raise NoValue(f"{sign} is for whole numbers") from None
         except OverflowError:
             raise NoValue(f"what {sign} gives is too large") from None
-        return Value(number=int(found) if isinstance(found, bool) else found)
+        return Value(number=int(result) if isinstance(result, bool) else result)
 
     return applied
 
@@ -204,8 +204,8 @@ def _either(stops: bool, left: Term, right: Term) -> Term:
     """`||` (stops where the left side is true) and `&&`."""
 
     def either(moment: Lookup) -> Value:
-        found = bool(number(left(moment)))
-        return Value(number=int(found if found == stops else bool(number(right(moment)))))
+        truth = bool(number(left(moment)))
+        return Value(number=int(truth if truth == stops else bool(number(right(moment)))))
 
     return either
 
@@ -227,8 +227,8 @@ class _Reader:
         if len(self.tokens) > _MOST_TOKENS or len(text) > _MOST_CHARACTERS:
             raise self.refused("is too long")
 
-    def refused(self, what: str) -> NoValue:
-        return NoValue(f"{shortened(repr(self.text))} {what}")
+    def refused(self, reason: str) -> NoValue:
+        return NoValue(f"{shortened(repr(self.text))} {reason}")
 
     @property
     def token(self) -> str:

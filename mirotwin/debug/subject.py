@@ -46,17 +46,19 @@ def launched(given: Mapping[str, Any]) -> DebugSubject:
     """
     fields = [name for name in DebugSubject.__struct_fields__ if name not in ("bare", "subject", "expected")]
     options = ["set" if name == "settings" else name.replace("_", "-") for name in fields]
-    keys = {re.sub("-(.)", lambda found: found[1].upper(), option): option for option in options}
+    keys = {re.sub("-(.)", lambda match: match[1].upper(), option): option for option in options}
     words: list[str] = []
     for key, option in keys.items():
         values = given[key] if isinstance(given.get(key), list) else [given.get(key)]
         words += [word for value in values if value is not None for word in (f"--{option}", f"{value}")]
     command: Any = command_of(DebugSubject)(lambda options: options)  # type: ignore[arg-type, return-value]
     try:
-        found: DebugSubject = command.main([*words, "--", given.get("subject") or ""], standalone_mode=False)
+        subject: DebugSubject = command.main(
+            [*words, "--", given.get("subject") or ""], standalone_mode=False
+        )
     except click.UsageError as error:
         raise BadInput("", "launch", error.format_message(), f"its keys are {', '.join(keys)}") from None
-    return found
+    return subject
 
 
 def open_subject(options: DebugSubject, everyone: bool = False) -> tuple[Debugger, list[str], str]:
@@ -77,22 +79,22 @@ def open_subject(options: DebugSubject, everyone: bool = False) -> tuple[Debugge
     symbols = Symbols(*debugged_image(run.image, images, options.sources))
     image, files = symbols.image, {line.file for line in symbols.line_begins.values()}
     timeline = Timeline(run)
-    debugger, said, why = Debugger(timeline, symbols, everyone), list[str](), "begin"
+    debugger, notes, why = Debugger(timeline, symbols, everyone), list[str](), "begin"
     if not image.symbols.names:
-        said.append(f"no symbols: no .map or .cdb beside {image.path.name}; places are addresses")
+        notes.append(f"no symbols: no .map or .cdb beside {image.path.name}; places are addresses")
     elif files and not any(map(symbols.sources.path, files)):
-        said.append("no C files: --sources names their folder")
+        notes.append("no C files: --sources names their folder")
     with timeline.shown(f"opening {subject}"):
         if run.job is not None and (run.job.case.verdict or run.job.alone):
             verdict = _judged(timeline, run, run.job)
         if verdict is not None:
             why = "case"
-            said += verdict.texts
+            notes += verdict.texts
             if verdict.failures:
                 _stand_at(timeline, verdict.failures[0], options.slot)
         if options.at is not None:
             why = debugger.go_to(options.at.ticks(run.tick_hz))
-    return debugger, said, why
+    return debugger, notes, why
 
 
 def _judged(timeline: Timeline, run: InspectedRun, job: Job) -> Result:
@@ -111,9 +113,9 @@ def _judged(timeline: Timeline, run: InspectedRun, job: Job) -> Result:
 
 def _stand_at(timeline: Timeline, failure: Failure, slot: int | None) -> None:
     place = (failure.network, failure.slot if slot is None else slot)
-    for at, core in enumerate(timeline.cores):
+    for index, core in enumerate(timeline.cores):
         if core.robot is not None and (core.robot.network, core.robot.slot) == place:
-            timeline.focus = at
+            timeline.focus = index
     timeline.go_to(failure.tick)
 
 

@@ -80,8 +80,8 @@ class Symbols:
 
     def entry(self, address: int) -> int:
         """Where the function of the instruction begins: one of C may have names within it."""
-        found = self.debug.function_at(address)
-        return self.names.function(address)[0] if found is None else found.first
+        function = self.debug.function_at(address)
+        return self.names.function(address)[0] if function is None else function.first
 
     def at_line(self, file: str, line: int) -> tuple[list[int], SourceLine]:
         """Where the code of a line begins, in each function that has some, or that of the next line that has any.
@@ -90,15 +90,15 @@ class Symbols:
         """
         name = AnyPath(file).name
         own = [(place, address) for address, place in self.debug.lines if AnyPath(place.file).name == name]
-        what = f"{name}:{line}"
+        wanted = f"{name}:{line}"
         if not own:
             files = ", ".join(sorted({AnyPath(place.file).name for place in self.line_begins.values()}))
             remedy = f"the files are {files}" if files else "give an address: the image has no debug files"
-            raise BadInput("", what, "no code is of this file", remedy)
+            raise BadInput("", wanted, "no code is of this file", remedy)
         place = min((place for place, _ in own if place.line >= line), default=None, key=lambda one: one.line)
         if place is None:
             last = max(place.line for place, _ in own)
-            raise BadInput("", what, "no line has code from there on", f"the last one is {last}")
+            raise BadInput("", wanted, "no line has code from there on", f"the last one is {last}")
         addresses = sorted((address for one, address in own if one.line == place.line), reverse=True)
         firsts = {self.entry(address): address for address in addresses}
         return sorted(firsts.values()), place
@@ -189,9 +189,9 @@ class Moment:
         fitting = [one for one in there if not module or module in (one.scope, one.module)]
         near = [one for one in fitting if one.scope == own] or [one for one in fitting if not one.scope]
         if there and not near and len(fitting) != 1:
-            what = f"there are several {name}" if fitting else f"there is no {name} of {module}"
+            reason = f"there are several {name}" if fitting else f"there is no {name} of {module}"
             raise NoValue(
-                what, f"give one of {', '.join(f'{one.scope or one.module}:{name}' for one in there)}"
+                reason, f"give one of {', '.join(f'{one.scope or one.module}:{name}' for one in there)}"
             )
         return next(iter(near or fitting), None)
 
@@ -216,7 +216,7 @@ class Moment:
                 raise NoValue(f"{name} is not live: {why}")
 
     def locals(self) -> dict[str, Callable[[], Value]]:
-        """Of the function that it stands in; what is not live raises NoValue when it is asked for."""
+        """Of the function that it stands in; what is not live raises NoValue when it is read."""
         places = self._places()
         if places is None:
             return {}
@@ -247,36 +247,36 @@ class Moment:
                 local()
 
     def _is_lost(self, name: str) -> bool:
-        """Whether it cannot be told from the code where a local variable is."""
+        """Whether the code does not show where a local variable is."""
         places = self._places()
         if places is None:
             return False
-        for one in places.visible(self.pc):
-            if one.name == name:
-                return one.storage != STACK and isinstance(places.of(one, self.pc), str)
+        for variable in places.visible(self.pc):
+            if variable.name == name:
+                return variable.storage != STACK and isinstance(places.of(variable, self.pc), str)
         there = self.symbols.variables.by_name.get(name, ())
-        own = [one for one in there if one.scope == places.name]
-        return any(isinstance(self._arrived(places, one), str) for one in own)
+        own = [variable for variable in there if variable.scope == places.name]
+        return any(isinstance(self._arrived(places, variable), str) for variable in own)
 
-    def _arrived(self, places: LocalPlaces, one: Variable) -> tuple[int, ...] | str:
-        memory = range(one.address, one.address + one.type.size)
-        return places.in_memory(one.name, memory, one.space == "iram", self.pc)
+    def _arrived(self, places: LocalPlaces, variable: Variable) -> tuple[int, ...] | str:
+        memory = range(variable.address, variable.address + variable.type.size)
+        return places.in_memory(variable.name, memory, variable.space == "iram", self.pc)
 
-    def _local(self, places: LocalPlaces, one: LocalVariable) -> Value:
+    def _local(self, places: LocalPlaces, variable: LocalVariable) -> Value:
         """A local variable in registers or on the stack."""
-        if one.storage == STACK:
-            return self._on_stack(places, one)
-        where = places.of(one, self.pc)
+        if variable.storage == STACK:
+            return self._on_stack(places, variable)
+        where = places.of(variable, self.pc)
         if self.frame and not isinstance(where, str):
             where = "its registers belong to the function that is called"
-        home = one.registers[::-1] if -1 not in places.home(one) else ()
+        home = variable.registers[::-1] if -1 not in places.home(variable) else ()
         remedy = f"its home is {' '.join(home).upper()}: print what that holds" if home else ""
-        return self._in_registers(places, one.name, one.type, where, remedy)
+        return self._in_registers(places, variable.name, variable.type, where, remedy)
 
     def _in_registers(
         self, places: LocalPlaces, name: str, kind: CType, where: tuple[int, ...] | str, remedy: str = ""
     ) -> Value:
-        """`where`: its bytes, or why they cannot be told. Raises NoValue for that."""
+        """`where`: its bytes, or why they are not known. Raises NoValue for that."""
         cpu = self.core.cpu
         if (
             not isinstance(where, str)
@@ -290,15 +290,15 @@ class Moment:
         names = [_REGISTER_NAMES.get(place, f"R{place & 7}") for place in where[::-1]]
         return Value(kind, number=value_of(kind, data, {}), note=f"in {' '.join(names)}")
 
-    def _on_stack(self, places: LocalPlaces, one: LocalVariable) -> Value:
+    def _on_stack(self, places: LocalPlaces, variable: LocalVariable) -> Value:
         frame = self.frames()[self.frame]
         height = self.symbols.unwinder.heights.get(frame.pc, (-1, -1))[0]
         if not places.has_frame or frame.entry != places.function.first or height < 0:
-            raise NoValue(f"{one.name} is not live: it is on the stack, and no debug file says where")
-        if one.offset > 0 and height < one.offset + one.type.size:
-            raise NoValue(f"{one.name} is not live: it has no place on the stack yet")
+            raise NoValue(f"{variable.name} is not live: it is on the stack, and no debug file says where")
+        if variable.offset > 0 and height < variable.offset + variable.type.size:
+            raise NoValue(f"{variable.name} is not live: it has no place on the stack yet")
         fields = self.symbols.variables.structs.get(places.module, {})
-        return Value(one.type, "iram", frame.base + 1 + one.offset, self, fields=fields)
+        return Value(variable.type, "iram", frame.base + 1 + variable.offset, self, fields=fields)
 
     def _special(self, name: str) -> Value | None:
         """A register, a bit, a memory, the chips."""

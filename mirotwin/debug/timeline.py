@@ -58,7 +58,7 @@ Position = tuple[int, int]
 
 
 class Hit(NamedTuple):
-    """Something that was asked for is true in `cycle` of processor `core`, before the next instruction."""
+    """A trap's condition is true in `cycle` of processor `core`, before the next instruction."""
 
     cycle: int
     core: int
@@ -66,7 +66,7 @@ class Hit(NamedTuple):
 
 
 class Trap(NamedTuple):
-    """`ask` is asked before each instruction at one of `addresses`: None, or what is found."""
+    """`ask` is called before each instruction at one of `addresses`: None, or the value of a hit."""
 
     addresses: Collection[int]
     ask: Callable[[Core], object]
@@ -79,7 +79,7 @@ class _Checkpoint(NamedTuple):
 
 
 class Timeline:
-    """`run` from its start on. `interrupted` is asked between pieces: true ends a search where it is.
+    """`run` from its start on. `interrupted` is called between pieces: true ends a search where it is.
 
     `code_in_ram`: what is executed may change, and lie anywhere.
     """
@@ -98,7 +98,7 @@ class Timeline:
         self.state, self._restore = world.state.save, world.go_on_from
         self.focus = next(at for at, core in enumerate(self.cores) if core.cpu is run.cpu)
         self._begins = [core.cpu.cycles for core in self.cores]
-        self._kept: list[_Checkpoint] = []
+        self._checkpoints: list[_Checkpoint] = []
         self.kept_bytes = 0
         self._save()
 
@@ -134,35 +134,35 @@ class Timeline:
         return self.run.world.tick
 
     def _save(self) -> None:
-        """Keeps the state of now, unless it is kept."""
+        """Saves the present state, unless it is saved already."""
         tick = self._now
-        at = bisect.bisect_left(self._kept, tick, key=_TICK)
-        if at < len(self._kept) and self._kept[at].tick == tick:
+        index = bisect.bisect_left(self._checkpoints, tick, key=_TICK)
+        if index < len(self._checkpoints) and self._checkpoints[index].tick == tick:
             return
         state = self.state()
-        self._kept.insert(at, _Checkpoint(tick, state, [log.end for log in self._logs]))
+        self._checkpoints.insert(index, _Checkpoint(tick, state, [log.end for log in self._logs]))
         self.kept_bytes += len(state)
         if self.kept_bytes > BUDGET_BYTES:
-            del self._kept[1 : len(self._kept) // 2 : 2]
-            self.kept_bytes = sum(len(one.state) for one in self._kept)
+            del self._checkpoints[1 : len(self._checkpoints) // 2 : 2]
+            self.kept_bytes = sum(len(one.state) for one in self._checkpoints)
 
-    def _load(self, at: int) -> None:
-        one = self._kept[at]
-        self._restore(one.state)
-        for log, end in zip(self._logs, one.log_ends, strict=True):
+    def _load(self, index: int) -> None:
+        checkpoint = self._checkpoints[index]
+        self._restore(checkpoint.state)
+        for log, end in zip(self._logs, checkpoint.log_ends, strict=True):
             log.cut(end)
         for core in self.cores:
             del core.device.board.faults[core.device.board.fault_count :]
 
     def _before(self, tick: int) -> int:
         """The last checkpoint before `tick`, or the first one."""
-        return max(0, bisect.bisect_left(self._kept, tick, key=_TICK) - 1)
+        return max(0, bisect.bisect_left(self._checkpoints, tick, key=_TICK) - 1)
 
     def _look_closely(self, end_tick: int) -> None:
         """Sees to it that a checkpoint is at most 2 ms before `end_tick`, each one half as far from it as the last."""
-        at = self._before(end_tick)
-        if end_tick - self._kept[at].tick > CLOSE_TICKS:
-            self._load(at)
+        index = self._before(end_tick)
+        if end_tick - self._checkpoints[index].tick > CLOSE_TICKS:
+            self._load(index)
             while end_tick - self._now > CLOSE_TICKS and not self.run.over:
                 self._run_to((self._now + end_tick) // 2)
                 self._save()
@@ -172,11 +172,11 @@ class Timeline:
     def go_to(self, tick: int, stops: Callable[[], bool] = lambda: False) -> bool:
         """To the first moment at or after `tick`, or to the end of the run; whether it came there.
 
-        `stops` is asked between two pieces: true ends it where it is.
+        `stops` is called between two pieces: true ends it where it is.
         """
-        at = self._before(tick + 1)
-        if not self._kept[at].tick <= self._now <= tick:
-            self._load(at)
+        index = self._before(tick + 1)
+        if not self._checkpoints[index].tick <= self._now <= tick:
+            self._load(index)
         self._run_to(tick, stops)
         self._settle()
         return self._now >= tick
@@ -246,15 +246,15 @@ class Timeline:
     # Searching
 
     @contextmanager
-    def shown(self, what: str, interrupted: Callable[[], bool] = lambda: False) -> Iterator[None]:
+    def shown(self, label: str, interrupted: Callable[[], bool] = lambda: False) -> Iterator[None]:
         """Within it, what takes more than a second shows a bar, and `interrupted` may end a search."""
-        with ProgressBar(what, self.run.end_tick) as bar:
+        with ProgressBar(label, self.run.end_tick) as bar:
 
-            def asked() -> bool:
+            def is_interrupted() -> bool:
                 bar.to(self.tick)
                 return interrupted()
 
-            with self.interrupted_by(asked):
+            with self.interrupted_by(is_interrupted):
                 yield
 
     @contextmanager
@@ -272,10 +272,10 @@ class Timeline:
         None, at the end of the run or where it was interrupted, if there is none.
         """
         here = after or self.here
-        with self._asking(traps, lambda hit: hit[:2] > here) as found:
+        with self._asking(traps, lambda hit: hit[:2] > here) as hits:
 
             def later() -> list[Hit]:
-                return [hit for hit in found if hit[:2] > here]
+                return [hit for hit in hits if hit[:2] > here]
 
             self._run_to(NEVER_TICK, lambda: bool(later()) or self.interrupted())
             if not later():
@@ -294,16 +294,16 @@ class Timeline:
         end_tick, first = self.tick + 1, False
         self._look_closely(end_tick)  # where a hit is likely
         while not first:
-            at = self._before(end_tick)
-            begin_tick, first = self._kept[at].tick, at == 0
-            self._load(at)
-            with self._asking(traps) as found:
+            index = self._before(end_tick)
+            begin_tick, first = self._checkpoints[index].tick, index == 0
+            self._load(index)
+            with self._asking(traps) as hits:
                 self._run_to(end_tick, self.interrupted)
             if self._now < end_tick and not self.run.over:  # of this stretch the latest hits are missing
                 begin_tick = end_tick - 1
                 break
-            found.sort(key=_ORDER, reverse=True)
-            yield from (hit for hit in found if hit[:2] < here)
+            hits.sort(key=_ORDER, reverse=True)
+            yield from (hit for hit in hits if hit[:2] < here)
             end_tick, first = begin_tick, first or self.interrupted()
         self.go_to(begin_tick)
 
@@ -339,27 +339,30 @@ class Timeline:
     def _asking(
         self, traps: Mapping[int, Trap], enough: Callable[[Hit], bool] = lambda hit: False
     ) -> Iterator[list[Hit]]:
-        """Within it what the traps find is listed; a trap that finds `enough` is not asked again."""
-        found: list[Hit] = []
+        """Lists the hits of the traps within it; a trap with a hit that is `enough` is not called again."""
+        hits: list[Hit] = []
 
-        def ask(at: int, trap: Trap) -> bool:
-            it = trap.ask(self.cores[at])
+        def ask(index: int, trap: Trap) -> bool:
+            it = trap.ask(self.cores[index])
             if it is None:
                 return False
-            found.append(Hit(self.cores[at].cpu.cycles, at, it))
-            return enough(found[-1])
+            hits.append(Hit(self.cores[index].cpu.cycles, index, it))
+            return enough(hits[-1])
 
         asking = [
             MarkInspector(
-                self.cores[at].cpu, trap.addresses, partial(ask, at, trap), _own_marks(self.cores[at].device)
+                self.cores[index].cpu,
+                trap.addresses,
+                partial(ask, index, trap),
+                _own_marks(self.cores[index].device),
             )
-            for at, trap in traps.items()
+            for index, trap in traps.items()
         ]
         try:
-            yield found
+            yield hits
         finally:
-            for one in asking:
-                one.detach()
+            for watcher in asking:
+                watcher.detach()
 
 
 def _name(device: Device) -> str:

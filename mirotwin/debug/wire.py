@@ -29,7 +29,7 @@ class Request(msgspec.Struct):
 
 
 class Wire:
-    """Messages of a client, read by a thread of their own so that one that comes during a run is seen."""
+    """Messages of a client, read by a thread of their own so that one that comes during a run is noticed."""
 
     def __init__(self, source: BinaryIO, sink: BinaryIO) -> None:
         self.source = source
@@ -44,14 +44,14 @@ class Wire:
         Raises BadInput for what is no message, again and again: nothing is read after it.
         """
         try:
-            found = self.came.get(block=wait)
+            message = self.came.get(block=wait)
         except queue.Empty:
             return {}
-        if not isinstance(found, dict):
-            self.came.put(found)  # it is the last one
-        if isinstance(found, BadInput):
-            raise found
-        return found
+        if not isinstance(message, dict):
+            self.came.put(message)  # it is the last one
+        if isinstance(message, BadInput):
+            raise message
+        return message
 
     def send(self, message: Message) -> None:
         """Leaves out what is None. Raises OSError where the client has gone."""
@@ -61,15 +61,15 @@ class Wire:
         self.sink.flush()
 
     def _read_all(self) -> None:
-        found: Message | BadInput | None = {}
-        while isinstance(found, dict):
+        message: Message | BadInput | None = {}
+        while isinstance(message, dict):
             try:
-                found = self._read()
+                message = self._read()
             except BadInput as error:
-                found = error
+                message = error
             except (OSError, ValueError):  # it was closed
-                found = None
-            self.came.put(found)
+                message = None
+            self.came.put(message)
 
     def _read(self) -> Message | None:
         """Raises BadInput for a head with anything but the protocol's own fields: it may be a web browser's."""
@@ -80,8 +80,8 @@ class Wire:
             return None
         size = -1
         while line not in (b"\n", b"\r\n"):
-            if found := _LENGTH.fullmatch(line):
-                size = int(found[1])
+            if match := _LENGTH.fullmatch(line):
+                size = int(match[1])
             elif not _TYPE.fullmatch(line):
                 raise _garbage(line, "no field of a head")
             line = self.source.readline(_MOST_HEAD)
@@ -101,6 +101,6 @@ def _given(value: Any) -> Any:
     return [_given(one) for one in value] if isinstance(value, list) else value
 
 
-def _garbage(data: bytes, what: str) -> BadInput:
-    said = f"the client sends no message of the protocol: {shortened(repr(data[:_MOST_HEAD]))} is {what}"
-    return BadInput("--dap", "", said, "check what is connected")
+def _garbage(data: bytes, fault: str) -> BadInput:
+    reason = f"the client sends no message of the protocol: {shortened(repr(data[:_MOST_HEAD]))} is {fault}"
+    return BadInput("--dap", "", reason, "check what is connected")

@@ -12,6 +12,7 @@ from bisect import bisect_left, bisect_right
 from collections import defaultdict
 from collections.abc import Callable, Iterator, Sequence
 from itertools import pairwise
+from operator import attrgetter
 
 import msgspec
 
@@ -47,7 +48,7 @@ STATUS = 0xA2
 STATUS_AT_START = 0x22
 """`STATUS` without motor off, for a question that starts motors: the sample after it may precede the answer."""
 SLOWING_TICKS = CONTROL_PERIOD_TICKS * 8
-"""A wheel may go as fast as it was told so long ago: from 1.46 m/s it comes to rest in 243 ms."""
+"""A wheel may go as fast as the host requested so long ago: from 1.46 m/s it comes to rest in 243 ms."""
 NEAR = 2
 """Answers before and after a window that tell how late frames without an answer were."""
 
@@ -72,37 +73,41 @@ def compare(
     sent, until_tick = _Sent(port, robots), port[-1].tick - rule.within_ticks
     judged: list[Difference | None] = []
     beside, unsure = {}, 0
-    for slot, heard in sorted(here.items()):
-        beside[slot] = _side_by_side(heard, there.pop(slot, []), until_tick)
+    for slot, answers in sorted(here.items()):
+        beside[slot] = _side_by_side(answers, there.pop(slot, []), until_tick)
         late = [one.tick - other.tick for one, other in beside[slot] if one is not None and other is not None]
         unsure = max([unsure, *late])
         judged += _judged(beside[slot], late, slot, sent, rule)
-    found = sorted((one for one in judged if one is not None), key=lambda one: one.tick)
-    return PortComparison(beside, unsure / TICKS_PER_MS, found, tuple(sorted(there)), judged.count(None))
+    differences = sorted((one for one in judged if one is not None), key=attrgetter("tick"))
+    return PortComparison(
+        beside, unsure / TICKS_PER_MS, differences, tuple(sorted(there)), judged.count(None)
+    )
 
 
 def _by_slot(periods: Sequence[Period]) -> dict[int, list[LogEntry]]:
-    """The valid answers that the PC heard, with the ticks at which it had heard all of them."""
-    decoder, found = TelemetryDecoder(), defaultdict(list)
-    for one in on_air(periods, 0, sent=False):
-        for event in decoder.feed(one.data):
-            said = answer_of(event) if isinstance(event, Received) else None
-            if said is not None:
-                text = f"answer of {said.slot} to {said.seq}"
-                found[said.slot].append(LogEntry(one.end_tick, text, said))
-    return found
+    """The valid answers that the PC received, each with the tick at which it was complete."""
+    decoder, answers = TelemetryDecoder(), defaultdict(list)
+    for transmission in on_air(periods, 0, sent=False):
+        for event in decoder.feed(transmission.data):
+            answer = answer_of(event) if isinstance(event, Received) else None
+            if answer is not None:
+                text = f"answer of {answer.slot} to {answer.seq}"
+                answers[answer.slot].append(LogEntry(transmission.end_tick, text, answer))
+    return answers
 
 
 def _side_by_side(port: Sequence[LogEntry], twin: Sequence[LogEntry], until_tick: int) -> list[Pair]:
     """Pairs of answers, the port's ticks less the shortest delay. After `until_tick` no answer counts as missing."""
-    heard = defaultdict(list)
+    ticks_of = defaultdict(list)
     for answer in port:
-        heard[answer.text].append(answer.tick)
+        ticks_of[answer.text].append(answer.tick)
     delays = []
     for answer in twin:
-        ticks = heard[answer.text]
-        at = bisect_left(ticks, answer.tick - EARLY_TICKS)
-        delays += [tick - answer.tick for tick in ticks[at : at + 1] if tick - answer.tick < TOGETHER_TICKS]
+        ticks = ticks_of[answer.text]
+        index = bisect_left(ticks, answer.tick - EARLY_TICKS)
+        delays += [
+            tick - answer.tick for tick in ticks[index : index + 1] if tick - answer.tick < TOGETHER_TICKS
+        ]
     way = min(delays, default=0)
     shifted = [answer._replace(tick=answer.tick - way) for answer in port]
     both = pairs(shifted, twin, 0, TOGETHER_TICKS)
@@ -110,22 +115,22 @@ def _side_by_side(port: Sequence[LogEntry], twin: Sequence[LogEntry], until_tick
 
 
 class _Sent:
-    """What the host said: when each transmission ended, and the velocities of all robots by then."""
+    """The host's transmissions: when each transmission ended, and the velocities of all robots by then."""
 
     def __init__(self, periods: Sequence[Period], robots: int) -> None:
         decoder = Decoder(robots)
         self.ends: list[int] = []
         self.velocities: list[Sequence[tuple[int, int]]] = []
         velocities: Sequence[tuple[int, int]] = ((0, 0),) * robots
-        for one in on_air(periods, 0, sent=True):
-            for event in decoder.feed(one.data):
+        for transmission in on_air(periods, 0, sent=True):
+            for event in decoder.feed(transmission.data):
                 try:
-                    said = event.message(robots) if isinstance(event, Received) else None
+                    message = event.message(robots) if isinstance(event, Received) else None
                 except ContentError:
                     continue
-                if isinstance(said, TeamFrame):
-                    velocities = said.velocities
-            self.ends.append(one.end_tick)
+                if isinstance(message, TeamFrame):
+                    velocities = message.velocities
+            self.ends.append(transmission.end_tick)
             self.velocities.append(velocities)
 
     def near_a_limit(self, after_tick: int, until_tick: int, unsure_ticks: int) -> bool:
@@ -142,11 +147,11 @@ class _Sent:
         """
         first = bisect_right(self.ends, after_tick - SLOWING_TICKS)
         before_tick, words = 0, [0]
-        for at in range(first, bisect_left(self.ends, until_tick)):
-            if self.ends[at] - before_tick > FAILSAFE_STOP_TICKS:
+        for index in range(first, bisect_left(self.ends, until_tick)):
+            if self.ends[index] - before_tick > FAILSAFE_STOP_TICKS:
                 words.append(0)
-            before_tick = self.ends[at]
-            words.append(self.velocities[at][slot][wheel])
+            before_tick = self.ends[index]
+            words.append(self.velocities[index][slot][wheel])
         return sum(abs(one - other) for one, other in pairwise([*words, 0])) / 2
 
 
@@ -162,10 +167,10 @@ def _judged(
     full = 0
     for here, there in both:
         if here is None or there is None:
-            one = here or there  # the first may be to a number that the robot knew
-            if one is not None and (before is not None or not late):
-                question = f"to question {one.said.seq}"
-                yield differs(one.tick, "answer", here and question, there and question)
+            answer = here or there  # the first may be to a number that the robot knew
+            if answer is not None and (before is not None or not late):
+                question = f"to question {answer.said.seq}"
+                yield differs(answer.tick, "answer", here and question, there and question)
             continue
         if late[full] > rule.within_ticks:
             yield differs(there.tick, "answer", f"{late[full] / TICKS_PER_MS:.1f} ms late", "in time")
@@ -188,7 +193,7 @@ def _judged(
 
 def _went(name: str, modulus: int, least: int) -> Callable[[TelemetryFrame, TelemetryFrame], int]:
     """By how much a value that wraps went on."""
-    return lambda one, other: (getattr(other, name) - getattr(one, name) - least) % modulus + least
+    return lambda earlier, later: (getattr(later, name) - getattr(earlier, name) - least) % modulus + least
 
 
 def _status(name: str) -> Callable[[TelemetryFrame, TelemetryFrame], int]:

@@ -35,7 +35,7 @@ WHEELS = Wheels()
 _WHERE = "Talk to a robot: /dev/ttyUSB0, or any URL that pyserial knows."
 _MOTION = "Send what moves a robot, too. Without it only what lets it stand is sent."
 _FASTEST = "Refuse what makes a wheel faster, in m/s."
-_URL = PathType(readable=False)  # who may not open it is told by the port what to do
+_URL = PathType(readable=False)  # the port's own error names the remedy
 _SPEED = FiniteNumber(0.0, WHEELS.limit_m_s)
 
 
@@ -66,7 +66,7 @@ class FrameSent(NamedTuple):
         return self.body[0] % SEQ_MODULUS
 
     def speeds(self) -> list[tuple[float, float]]:
-        """What each robot's wheels are told, in m/s, none by a frame without velocities."""
+        """The velocities for each robot's wheels, in m/s; none in a frame without velocities."""
         if self.kind not in (FrameType.TEAM, FrameType.TEAM_ASK):
             return []
         words = struct.iter_unpack("<hh", self.body[1:])

@@ -78,7 +78,7 @@ REOPENINGS = 3
 BOOT_TICKS = TICKS_PER_SECOND // 10
 """A twin that is switched on at tick 0 is up by then."""
 ROUNDS = 4
-"""How often each robot is asked who it is."""
+"""How often each robot is requested to identify itself."""
 APART = 32
 """Numbers between the last question of the greeting and what follows it."""
 PAUSE_TICKS = FRESH_AGAIN_TICKS + TICKS_PER_SECOND // 10
@@ -91,7 +91,7 @@ PIECE_BYTES = 200
 LEAD_TICKS = PIECE_BYTES * HOST_CHARACTER_TICKS // 2
 """Of a long transmission the next piece is handed over so long before the piece under way is sent."""
 SETTLED_TICKS = 2 * CONTROL_PERIOD_TICKS
-"""An answer that is whole belongs to no earlier period than this; a question is told when it is sent."""
+"""An answer that is whole belongs to no earlier period than this; a question is logged when it is sent."""
 _REMEDIES = {
     errno.ENOENT: ("there is no such port", "`python -m serial.tools.list_ports` lists those there are"),
     errno.EACCES: ("no permission to open it", "join the group that owns it (dialout), and log in again"),
@@ -158,12 +158,12 @@ class RobotPort:
         self.late_ticks: list[int] = []
         self.slots: tuple[int, ...] = ()
         self.delays: list[int] = []
-        self._asked: dict[int, int] = {}
+        self._question_ticks: dict[int, int] = {}
         self.began_tick = self.free_tick = 0
         self.prompt = self._blocked = False
         self._counted: dict[int, tuple[int, int]] = {}
         self._decoder = TelemetryDecoder()
-        self._heard_tick = self._end_tick = self._recorded = self._came = self.dropped = 0
+        self._received_tick = self._end_tick = self._recorded = self._came = self.dropped = 0
         self._began_ns = time.monotonic_ns()
         self._serial: Any = _opened(self.url)
         self._virtual = getattr(self._serial, "virtual_tick", None) is not None
@@ -178,7 +178,7 @@ class RobotPort:
         with held_signals():
             self.stop()
             realtime_priority(False)
-            self._keep(self._decoder.flush(), self._heard_tick)
+            self._keep(self._decoder.flush(), self._received_tick)
             self._record(max(self._now, self.free_tick, self._end_tick) + CONTROL_PERIOD_TICKS)
             with suppress(*PORT_ERRORS):
                 self._serial.close()
@@ -211,8 +211,8 @@ class RobotPort:
 
     def run_to(self, tick: int) -> None:
         """Waits until then, and reads. Raises PortError."""
-        while (left := tick - self.tick) > 0:
-            self._take(self._read(left))
+        while (remaining := tick - self.tick) > 0:
+            self._take(self._read(remaining))
         self._take(self._read(0))
 
     def run_for(self, for_ticks: int) -> None:
@@ -254,7 +254,7 @@ class RobotPort:
             self.run_to(at_tick)
         numbers = self.guard.check(data, f"tick {self.tick}")
         now = self._now
-        with self._told():
+        with self._port_errors():
             if self._blocked:  # how much of what was sent last is on its way is not known
                 raise serial.SerialTimeoutException
             sent = Transmission(max(now, self.free_tick), DOWN, data)
@@ -265,7 +265,7 @@ class RobotPort:
         if at_tick is not None:
             self.late_ticks.append(max(0, now - self.began_tick - at_tick))
         self.wire.append(sent)
-        self._asked |= dict.fromkeys(numbers, sent.tick)
+        self._question_ticks |= dict.fromkeys(numbers, sent.tick)
         tick = sent.tick - self.began_tick
         self.log.note(Event(tick=tick, what="sent", data=data))
         return tick
@@ -283,13 +283,13 @@ class RobotPort:
     robot = device
 
     def play(self, sent: Iterable[Transmission], each: Callable[[int], object] = lambda tick: None) -> None:
-        """Sends these at their ticks, and reads meanwhile and a little longer; `each` is told how far it is."""
-        for one in sent:
-            for start in range(0, len(one.data), PIECE_BYTES):
-                due = one.tick + start * HOST_CHARACTER_TICKS - (LEAD_TICKS if start else 0)
-                self.inject(one.data[start : start + PIECE_BYTES], at_tick=due)
+        """Sends these at their ticks, and reads meanwhile and a little longer; `each` gets the tick of each end."""
+        for transmission in sent:
+            for start in range(0, len(transmission.data), PIECE_BYTES):
+                due = transmission.tick + start * HOST_CHARACTER_TICKS - (LEAD_TICKS if start else 0)
+                self.inject(transmission.data[start : start + PIECE_BYTES], at_tick=due)
             self._record(self._now - SETTLED_TICKS)
-            each(one.end_tick)
+            each(transmission.end_tick)
         self.run_to(self.earliest_tick() + AFTER_TICKS)
 
     def stop(self) -> None:
@@ -325,40 +325,49 @@ class RobotPort:
                 self.began_tick = self._now
                 self.waits.forget()
                 return robots
-        self._keep(self._decoder.flush(), self._heard_tick)
+        self._keep(self._decoder.flush(), self._received_tick)
         raise BadInput(self.url, "", *self._why_nobody(sizes, first))
 
     def _who_answers(self, robots: int, sent: Iterable[Transmission]) -> dict[int, tuple[int, int]]:
-        """By slot, how many frames each has accepted and rejected; each is asked some times, standing."""
-        self._counted, self._asked, self.delays, cursor = {}, {}, [], Cursor(self.log)
+        """By slot, how many frames each has accepted and rejected; each is questioned some times, standing."""
+        self._counted, self._question_ticks, self.delays, cursor = {}, {}, [], Cursor(self.log)
         decoder = Decoder(robots)
-        told = (event.seq for one in sent for event in decoder.feed(one.data) if isinstance(event, Received))
-        seq = (next(told, 0) - APART - ROUNDS * robots) % SEQ_MODULUS
+        numbers = (
+            event.seq
+            for transmission in sent
+            for event in decoder.feed(transmission.data)
+            if isinstance(event, Received)
+        )
+        seq = (next(numbers, 0) - APART - ROUNDS * robots) % SEQ_MODULUS
         self.run_to(BOOT_TICKS)
         for _ in range(ROUNDS * robots):
-            asked = self.inject(encode(TeamFrame(FrameType.TEAM_ASK, seq, ((0, 0),) * robots), robots))
-            self.run_to(asked + CONTROL_PERIOD_TICKS)
+            sent_tick = self.inject(encode(TeamFrame(FrameType.TEAM_ASK, seq, ((0, 0),) * robots), robots))
+            self.run_to(sent_tick + CONTROL_PERIOD_TICKS)
             seq = (seq + 1) % SEQ_MODULUS
         self.run_to(self.tick + PAUSE_TICKS)
         counted = {}
-        for said in [answer_of(event.frame) for _, event in cursor.read() if event.frame]:
-            if said is not None and said.seq in self._asked and said.slot == said.seq % robots:
-                since = (self.guard.last[robots] - said.seq) % SEQ_MODULUS  # questions to others
-                counted[said.slot] = (said.accepted + since, said.rejected)
+        for answer in [answer_of(event.frame) for _, event in cursor.read() if event.frame]:
+            if (
+                answer is not None
+                and answer.seq in self._question_ticks
+                and answer.slot == answer.seq % robots
+            ):
+                since = (self.guard.last[robots] - answer.seq) % SEQ_MODULUS  # questions to others
+                counted[answer.slot] = (answer.accepted + since, answer.rejected)
         return counted if self.delays else {}  # without any, the numbers are those of later questions
 
     def _why_nobody(self, sizes: Sequence[int], first: int) -> tuple[str, str]:
         """What came instead of answers, and what to do."""
         came = b"".join(one.data for one in self.wire[first:] if one.direction == UP)
-        asked = f"no robot of a network of {' or '.join(map(str, sizes))} answers"
+        problem = f"no robot of a network of {' or '.join(map(str, sizes))} answers"
         if not came:
-            return f"{asked}: nothing comes", "is it switched on, and is this its radio's port?"
+            return f"{problem}: nothing comes", "is it switched on, and is this its radio's port?"
         if any(isinstance(event, Received) for event in Decoder(sizes[0]).feed(came)):
-            return f"{asked}: the port echoes what is sent", "turn the echo of the adapter off"
+            return f"{problem}: the port echoes what is sent", "turn the echo of the adapter off"
         if any(isinstance(event, Received) for event in TelemetryDecoder().feed(came)):
-            return f"{asked}, but others answer", "is it a network of another size?"
-        what = f"{asked}: {len(came)} characters come that are no answer, {came[:6].hex(' ')} .."
-        return what, "is this the radio's port, and is its rate 9600 baud?"
+            return f"{problem}, but others answer", "is it a network of another size?"
+        reason = f"{problem}: {len(came)} characters come that are no answer, {came[:6].hex(' ')} .."
+        return reason, "is this the radio's port, and is its rate 9600 baud?"
 
     # ---- reading -----------------------------------------------------------------------------------------
 
@@ -372,18 +381,18 @@ class RobotPort:
             with unread.mutex:
                 self.dropped += len(unread.queue)
                 unread.queue.clear()
-        with self._told():
+        with self._port_errors():
             if self._virtual:
                 port.timeout = wait_s
                 return bytes(port.read(max(1, port.in_waiting)))
-            found = bytes(port.read(READ_BYTES))
-            if not found and wait_s:
+            data = bytes(port.read(READ_BYTES))
+            if not data and wait_s:
                 try:
                     select.select([port], [], [], wait_s)
                 except OSError:  # it has no descriptor
                     time.sleep(min(wait_s, LOOK_S))
-                found = bytes(port.read(READ_BYTES))
-            return found
+                data = bytes(port.read(READ_BYTES))
+            return data
 
     def _take(self, data: bytes) -> None:
         now = self._now
@@ -393,24 +402,26 @@ class RobotPort:
         if not data:
             return
         self._came += len(data)
-        if now - self._heard_tick > CUT_TICKS and self._decoder.pending:
-            self._keep(self._decoder.flush(), self._heard_tick)
-        self._heard_tick = now
+        if now - self._received_tick > CUT_TICKS and self._decoder.pending:
+            self._keep(self._decoder.flush(), self._received_tick)
+        self._received_tick = now
         for byte in data:
             self.log.note(Event(tick=now - self.began_tick, what="heard", value=byte))
         self._keep(self._decoder.feed(data), now)
 
     def _keep(self, decoded: Iterable[Decoded], now: int) -> None:
-        for one in decoded:
-            came = Transmission(max(self._end_tick, now - len(one.data) * character_ticks(UP)), UP, one.data)
+        for item in decoded:
+            came = Transmission(
+                max(self._end_tick, now - len(item.data) * character_ticks(UP)), UP, item.data
+            )
             self._end_tick = came.end_tick
             self.wire.append(came)
-            if isinstance(one, Received):
-                said = answer_of(one)
-                slot = -1 if said is None else said.slot
-                if said is not None and said.seq in self._asked:
-                    self.delays.append(now - self._asked[said.seq])
-                frame = self._from_zero(one, slot)
+            if isinstance(item, Received):
+                answer = answer_of(item)
+                slot = -1 if answer is None else answer.slot
+                if answer is not None and answer.seq in self._question_ticks:
+                    self.delays.append(now - self._question_ticks[answer.seq])
+                frame = self._from_zero(item, slot)
                 self.log.note(Event(tick=now - self.began_tick, what="answer", value=slot, frame=frame))
 
     def _from_zero(self, frame: Received, slot: int) -> Received:
@@ -420,20 +431,20 @@ class RobotPort:
         return msgspec.structs.replace(frame, body=frame.body[:-2] + last)
 
     @contextmanager
-    def _told(self) -> Iterator[None]:
+    def _port_errors(self) -> Iterator[None]:
         """Errors of the port, which pyserial derives from OSError, as a PortError."""
         try:
             yield
         except serial.SerialTimeoutException:
             self._blocked = True
-            what = f"it takes no characters for {BLOCKED_S:g} s"
-            raise PortError(self.url, "", what, "look at its flow control, and at who reads it") from None
+            reason = f"it takes no characters for {BLOCKED_S:g} s"
+            raise PortError(self.url, "", reason, "look at its flow control, and at who reads it") from None
         except PORT_ERRORS as error:
             seconds = self._now / TICKS_PER_SECOND
             with suppress(*PORT_ERRORS):
                 self._serial.close()
-            what, remedy = f"the port is lost: {error}", "robots that hear nothing stop after 110 ms"
-            raise PortError(self.url, f"{seconds:.3f} s", what, remedy) from None
+            reason, remedy = f"the port is lost: {error}", "robots that hear nothing stop after 110 ms"
+            raise PortError(self.url, f"{seconds:.3f} s", reason, remedy) from None
 
     # ---- a recording like any other ----------------------------------------------------------------------
 
@@ -500,8 +511,8 @@ def _opened(url: str) -> Any:
             number = errno.EBUSY
         why = f"{error}".rpartition(f"{address}: ")[2]
         unknown = f"cannot be opened: {why}", "is its address right, and does anybody serve it?"
-        what, remedy = _REMEDIES.get(number or 0, unknown)
-        raise PortError(url, "", what, remedy) from None
+        reason, remedy = _REMEDIES.get(number or 0, unknown)
+        raise PortError(url, "", reason, remedy) from None
     finally:
         realtime_priority(False)
 

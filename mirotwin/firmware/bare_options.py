@@ -174,7 +174,7 @@ def target_of(path: str, image: Image, options: BareOptions) -> int | None:
 class Ended(StrEnum):
     """Why a run ended."""
 
-    UNTIL = "until"  # the address asked for is next
+    UNTIL = "until"  # the requested address is next
     CYCLES = "cycles"  # the limit is reached
     FAULT = "fault"
     PAUSED = "paused"  # it can go on
@@ -188,7 +188,7 @@ def make_world(
     output: Callable[[bytes], object] | None = None,
     live: bool = False,
 ) -> World:
-    """A world of one board, as it was asked for. `output` gets what it sends. Raises BadInput, and errors of the files
+    """A world of one board, from the options. `output` gets what it sends. Raises BadInput, and errors of the files
     read.
     """
     pieces, pins = _pieces(options), _pins(options)
@@ -274,16 +274,16 @@ def report(world: World, options: BareOptions) -> int:
     if (board.faults or why in (Ended.CYCLES, Ended.HALTED)) and world.image.symbols.problem:
         complain(f"addresses have no names: {world.image.symbols.problem}")
     waiting = serial.waiting_for
-    left = amount(serial.left, "byte of --stdin was", "bytes of --stdin were")
+    unsent = amount(serial.left, "byte of --stdin was", "bytes of --stdin were")
     if waiting:
         times = serial.seen[waiting]
-        seen = f"was not seen again after {amount(times, 'time')}" if times else "was not seen"
-        complain(f"--stdin-when: {waiting!r} {seen}; {left} not sent")
+        outcome = f"was not seen again after {amount(times, 'time')}" if times else "was not seen"
+        complain(f"--stdin-when: {waiting!r} {outcome}; {unsent} not sent")
     elif serial.left and not serial.live and why is not Ended.UNTIL:
         reason = (
             "the run ended first" if serial.char_end else "the receiver was never on, and no --baud is given"
         )
-        complain(f"{left} not sent: {reason}")
+        complain(f"{unsent} not sent: {reason}")
     if options.stdin and board.cpu.sfr(_SCON) & _NINE_BITS:
         complain("--stdin: the serial port takes characters of 9 bits; the ninth was 1 in all that were sent")
     changed = board.changed_code()
@@ -336,8 +336,8 @@ def _delays(whens: list[bytes], options: BareOptions) -> list[int | None]:
     """The delay of each --stdin: its own, or the only one for the first and for all that wait for a text."""
     after = [time.ticks(options.crystal_hz) for time in options.stdin_after]
     if len(after) not in (0, 1, len(whens)):
-        what = f"{len(after)} for {len(whens)} --stdin"
-        raise BadInput("", "--stdin-after", what, "give one for all, or one for each --stdin")
+        reason = f"{len(after)} for {len(whens)} --stdin"
+        raise BadInput("", "--stdin-after", reason, "give one for all, or one for each --stdin")
     if len(after) == 1:
         return [after[0] if when or not index else None for index, when in enumerate(whens)]
     return list(after) or [None] * len(whens)

@@ -44,14 +44,14 @@ def functions_at(places: Iterable[str], image: Image, names: SymbolNames, path: 
 
     An address stands for the function around it.
     """
-    found = set()
+    functions = set()
     for place in places:
         address = address_of(place, image, path, "--symbol")
         check_code_at(address, image, path, "--symbol")
         around = names.function(address)
         by_address = place[:2].lower() == "0x"
-        found |= {around} if by_address else {other for other in names.functions if other[1] == around[1]}
-    return found
+        functions |= {around} if by_address else {other for other in names.functions if other[1] == around[1]}
+    return functions
 
 
 def place_of(address: int, image: Image) -> str:

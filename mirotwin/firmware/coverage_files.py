@@ -47,7 +47,7 @@ def listing_path(out: Path) -> Path:
 
 
 def collect(image: Image, counts: Counts, sources: Sources, out: Path | None) -> Report:
-    """Coverage of `image` with paths as seen from the current folder."""
+    """Coverage of `image` with paths relative to the current folder."""
     debug = DebugInfo.of(image)
     share = instruction_share(image, debug, counts)
     if debug.lines:
@@ -86,7 +86,9 @@ def table(tracefile: Tracefile) -> Table:
     """A row a file and a total: lines, branches, and the lines that never ran."""
     result = plain_table("file", "lines", "branches", "never ran")
     for path in sorted(tracefile):
-        one = {path: tracefile[path]}
-        result.add_row(one_line(path), str(line_share(one)), str(branch_share(one)), missed(tracefile[path]))
+        single = {path: tracefile[path]}
+        result.add_row(
+            one_line(path), str(line_share(single)), str(branch_share(single)), missed(tracefile[path])
+        )
     result.add_row("all", str(line_share(tracefile)), str(branch_share(tracefile)), "")
     return result

@@ -78,16 +78,16 @@ def _print(result: Profile, name: str) -> None:
     show(functions)
     worst = ("count", "worst latency", "at tick", "worst duration", "at tick", "of all")
     interrupts = plain_table("interrupt", right=worst)
-    for found in result.interrupts:
-        if found.count:
+    for interrupt in result.interrupts:
+        if interrupt.count:
             interrupts.add_row(
-                found.source,
-                str(found.count),
-                amount(found.worst_latency, "cycle"),
-                str(found.worst_latency_tick),
-                "never left" if found.never_left else amount(found.worst_duration, "cycle"),
-                str(found.unfinished_tick if found.never_left else found.worst_duration_tick),
-                _percent(found.total_cycles, result.cycles),
+                interrupt.source,
+                str(interrupt.count),
+                amount(interrupt.worst_latency, "cycle"),
+                str(interrupt.worst_latency_tick),
+                "never left" if interrupt.never_left else amount(interrupt.worst_duration, "cycle"),
+                str(interrupt.unfinished_tick if interrupt.never_left else interrupt.worst_duration_tick),
+                _percent(interrupt.total_cycles, result.cycles),
             )
     if interrupts.row_count:
         show(interrupts)

@@ -102,8 +102,8 @@ def _keys(keyboard: int, due_s: float) -> bytes | None:
     """What was typed until `due_s`, which is waited for; None when the terminal has gone."""
     keys = b""
     while True:
-        left_s = due_s - time.monotonic()
-        if not select.select([keyboard], [], [], max(0.0, left_s))[0]:
+        remaining_s = due_s - time.monotonic()
+        if not select.select([keyboard], [], [], max(0.0, remaining_s))[0]:
             return keys
         try:
             more = os.read(keyboard, READ_BYTES)
@@ -112,7 +112,7 @@ def _keys(keyboard: int, due_s: float) -> bytes | None:
         if not more:
             return None
         keys += more
-        if left_s <= 0 or LEAVE in keys:
+        if remaining_s <= 0 or LEAVE in keys:
             return keys
 
 
@@ -181,8 +181,8 @@ def run(options: FwRunOptions) -> int:
     if options.terminal:
         check_terminal(bare)
     loaded = load_bare_image(image, bare, named=False)
-    for one in options.more:
-        loaded = loaded.merged(load_bare_image(one, bare, named=False))
+    for path in options.more:
+        loaded = loaded.merged(load_bare_image(path, bare, named=False))
     target = target_of(image, loaded, bare)
     out = sys.stdout.buffer
     world = make_world(loaded, bare, target, out.write, live=options.terminal)

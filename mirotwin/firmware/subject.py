@@ -83,7 +83,7 @@ class WindowOptions(SubjectOptions, frozen=True, kw_only=True):
 
 
 def open_window(options: WindowOptions) -> InspectedRun:
-    """The run that was asked for, at its first tick. Raises BadInput where the window is not in it.
+    """The requested run, at its first tick. Raises BadInput where the window is not in it.
 
     An empty window is refused before anything is read.
     """
@@ -91,16 +91,16 @@ def open_window(options: WindowOptions) -> InspectedRun:
     run = open_run(options)
     begin_tick = run.cpu.cycles * clock.CYCLE_TICKS
     if to_tick is not None and to_tick <= begin_tick:
-        what = f"the run begins at tick {begin_tick}"
-        raise BadInput(options.subject, f"--to {to_tick}t", what, "look later")
+        reason = f"the run begins at tick {begin_tick}"
+        raise BadInput(options.subject, f"--to {to_tick}t", reason, "look later")
     if run.end_tick is not None and from_tick >= run.end_tick:
-        what = f"the run ends at tick {run.end_tick}"
-        raise BadInput(options.subject, f"--from {from_tick}t", what, "look earlier")
+        reason = f"the run ends at tick {run.end_tick}"
+        raise BadInput(options.subject, f"--from {from_tick}t", reason, "look earlier")
     return run
 
 
 def open_run(options: SubjectOptions) -> InspectedRun:
-    """The run that was asked for, at its first tick. Raises BadInput."""
+    """The requested run, at its first tick. Raises BadInput."""
     if options.subject.lower().endswith(IMAGE_SUFFIXES):
         return _bare_run(options)
     return _robot_run(options)
@@ -185,7 +185,7 @@ def _robot_run(options: SubjectOptions) -> InspectedRun:
 
 
 def _which_robot(world: World, options: SubjectOptions) -> tuple[int, int]:
-    """(network, place among its devices) of the one that was asked for. Raises BadInput."""
+    """(network, place among its devices) of the requested one. Raises BadInput."""
     network = options.network or 0
     if network >= len(world.lines):
         remedy = use_one_of(map(str, range(len(world.lines))))

@@ -52,7 +52,7 @@ Tell = Callable[[str], object]
 
 
 class PortContext(NamedTuple):
-    """What all endpoints are made with: their radio, the selector that wakes the session, who is told."""
+    """What all endpoints are made with: their radio, the selector that wakes the session, where reports go."""
 
     port: RadioPort
     selector: BaseSelector
@@ -95,7 +95,7 @@ class Endpoint:
             self.port.send(data, at_tick)
 
     def deliver(self, data: bytes) -> None:
-        """What the PC has heard, to the client if one is there."""
+        """Passes what the PC has received to the client, if one is there."""
         if self.client:
             full = self.out.dropped
             self.out.add(data)

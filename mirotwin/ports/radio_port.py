@@ -3,8 +3,8 @@
     bytes to send  ──► transmit buffer, 4096 characters ──► air ──► robots
     bytes received ◄─────────── the PC's receiver ◄─────── air ◄── robots
 
-A character with a bad stop bit is delivered like any other, as serial ports do unless they are told to check; the
-recording knows which had one. Slicer noise is heard by robots only: the PC's receiver has a squelch.
+A character with a bad stop bit is delivered like any other, as serial ports do unless they are set to check; the
+recording knows which had one. Slicer noise reaches robots only: the PC's receiver has a squelch.
 """
 
 from __future__ import annotations

@@ -29,31 +29,31 @@ class Rfc2217Endpoint(TcpEndpoint):
     _manager: Any = None
 
     def greet(self) -> None:
-        self._told = False
+        self._reported = False
         self._manager = rfc2217.PortManager(_FixedSettings(self), self)
 
-    def heard_from(self, data: bytes) -> bytes:
+    def from_client(self, data: bytes) -> bytes:
         manager = self._manager
-        found = bytearray()
+        received = bytearray()
         for value in data:
             try:
                 for byte in manager.filter(bytes([value])):
-                    found += byte
+                    received += byte
                 if manager.suboption is not None and len(manager.suboption) > LONGEST_SUBOPTION:
                     raise ValueError("a suboption that does not end")
             except NONSENSE:
                 self._ignore()
-        return bytes(found)
+        return bytes(received)
 
     def _ignore(self) -> None:
         self._manager.suboption = None
         self._manager.mode = rfc2217.M_NORMAL
         self.ignored += 1
-        if not self._told:
-            self._told = True
+        if not self._reported:
+            self._reported = True
             self.tell(f"{self.name}: {self.client} negotiates nonsense, which is ignored")
 
-    def said_to(self, data: bytes) -> bytes:
+    def to_client(self, data: bytes) -> bytes:
         return b"".join(self._manager.escape(data))
 
 

@@ -1,6 +1,6 @@
 """`miro://` for pyserial: a robot behind its radio, in the process of the program that opens it.
 
-Each `open` is a robot that is switched on: virtual time begins at 0 and nothing is kept of the port's last use.
+Each `open` is a robot that is switched on: virtual time begins at 0 and nothing remains of the port's last use.
 
     read(n)          time passes until n bytes are there, up to `timeout` (None: for ever), or up to
                      `inter_byte_timeout` after a byte; it stands at the tick at which the last of them was known
@@ -168,21 +168,21 @@ class Serial(SerialBase):  # type: ignore[misc]  # pyserial has no types
 
     def read(self, size: int = 1) -> bytes:
         """See the head of this file. Raises SerialException once the run is over and all is read."""
-        there, gap_end, found = 0, NEVER_TICK, b""
+        there, gap_end, data = 0, NEVER_TICK, b""
 
         def until(world: World, deadline: int) -> int | None:
-            nonlocal there, gap_end, found
+            nonlocal there, gap_end, data
             if self._inter_byte_timeout is not None and len(self._inbox) > there:
                 there = len(self._inbox)
                 gap_end = world.tick + ticks(self._inter_byte_timeout)
             deadline = min(deadline, gap_end)
             if not self._read_ends(world, size, deadline):
                 return deadline
-            found = self._inbox.take(size)
+            data = self._inbox.take(size)
             return None
 
         self._wait(self._timeout, until, for_byte=True)
-        return found
+        return data
 
     def _read_ends(self, world: World, size: int, deadline: int) -> bool:
         if len(self._inbox) >= size:
@@ -313,7 +313,7 @@ class Serial(SerialBase):  # type: ignore[misc]  # pyserial has no types
         self._inbox.add(self._radio.received())
 
     def _advance(self, world: World, tick: int, for_byte: bool) -> None:
-        """In virtual time towards `tick`; with `for_byte` not beyond the next byte heard."""
+        """In virtual time towards `tick`; with `for_byte` not beyond the next byte received."""
         tick = min(tick, world.tick + CONTROL_PERIOD_TICKS)
         if for_byte:
             with suppress(WaitExpired):
@@ -349,8 +349,8 @@ class Serial(SerialBase):  # type: ignore[misc]  # pyserial has no types
             return f"the limit of {seconds(self._limit_tick):g} s of virtual time is reached (limit_s)"
         return "the day that a world may last is over" if world.finished else ""
 
-    def _note_poll(self, found: object) -> None:
-        self._polls = 0 if found else self._polls + (self._pace is None)
+    def _note_poll(self, data: object) -> None:
+        self._polls = 0 if data else self._polls + (self._pace is None)
         if self._polls == POLLS:
             warnings.warn(
                 f"{POLLS} times in a row nothing was there, and no time passed: in_waiting and reads with timeout 0"

@@ -122,7 +122,7 @@ def serve(options: ServeOptions) -> int:
         except BaseException:
             if world.index:
                 folder.keep = (*KEPT, CASE)
-                with suppress(OSError):  # a full disk, which is told as what ended the session
+                with suppress(OSError):  # a full disk, which is reported as what ended the session
                     _leave_case(folder, run)
             raise
         finally:

@@ -1,4 +1,4 @@
-"""The ports that `mirotwin serve` is asked for: their options, and opening them."""
+"""The ports of `mirotwin serve`: their options, and opening them."""
 
 from __future__ import annotations
 
@@ -27,8 +27,8 @@ HERE = "127.0.0.1"
 
 def port_number(word: str) -> tuple[int, int]:
     """NUMBER, or NUMBER@NETWORK; 0 stands for a free port."""
-    number, at, network = word.partition("@")
-    plain = _is_number(number) and (not at or _is_number(network))
+    number, separator, network = word.partition("@")
+    plain = _is_number(number) and (not separator or _is_number(network))
     if not plain or int(number) > HIGHEST_PORT:
         raise ValueError(f"{shortened(repr(word))} is no port, such as 7000, or 7000@1 for network 1.")
     return int(number), int(network or 0)
@@ -36,8 +36,8 @@ def port_number(word: str) -> tuple[int, int]:
 
 def link(word: str) -> tuple[str, int]:
     """A path, or PATH@NETWORK; "" or @NETWORK for none."""
-    path, at, network = word.rpartition("@")
-    return (path, int(network)) if at and _is_number(network) else (word, 0)
+    path, separator, network = word.rpartition("@")
+    return (path, int(network)) if separator and _is_number(network) else (word, 0)
 
 
 def address(word: str) -> str:
@@ -110,11 +110,11 @@ def open_ports(
 
     pty = options.pty if options.pty or options.tcp or options.rfc2217 else [("", 0)]
     with ExitStack() as closing:
-        found: list[Endpoint] = []
+        endpoints: list[Endpoint] = []
 
-        def add(one: Endpoint) -> None:
-            closing.callback(one.close)
-            found.append(one)
+        def add(opened: Endpoint) -> None:
+            closing.callback(opened.close)
+            endpoints.append(opened)
 
         for link, network in pty:
             add(PtyEndpoint(context("--pty", network), Path(link) if link else None, options.force))
@@ -122,4 +122,4 @@ def open_ports(
             add(TcpEndpoint(context("--tcp", network), options.host, number))
         for number, network in options.rfc2217:
             add(Rfc2217Endpoint(context("--rfc2217", network), options.host, number))
-        yield found
+        yield endpoints

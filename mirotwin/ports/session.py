@@ -36,7 +36,7 @@ class Pace:
         self.factor = factor
         self.late_ticks = 0
         self.late_s = 0.0
-        self._told_ticks = 0
+        self._reported_ticks = 0
         self.start(0)
 
     def start(self, tick: int) -> None:
@@ -52,16 +52,16 @@ class Pace:
     def note(self, from_tick: int, to_tick: int, due_tick: int) -> str:
         """Counts that a world went on from one tick to the other when it should have been at `due_tick`.
 
-        By how much it is behind, for people; "" where it is not late, or not twice as late as they were told last.
+        By how much it is behind, for people; "" where it is not late, or not twice as late as last reported.
         """
         behind = due_tick - to_tick
         self.late_ticks = max(self.late_ticks, behind)
         if behind < LATE_TICKS:
             return ""
         self.late_s += seconds(to_tick - from_tick)
-        if behind < 2 * self._told_ticks:
+        if behind < 2 * self._reported_ticks:
             return ""
-        self._told_ticks = behind
+        self._reported_ticks = behind
         return f"{1000.0 * seconds(behind):.0f} ms behind the wall clock"
 
     def wait_s(self, tick: int) -> float:

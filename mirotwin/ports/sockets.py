@@ -1,6 +1,6 @@
 """A radio's port behind TCP: the bytes as they are.
 
-A second client is refused: its connection is closed at once and the user is told. A client that has shut down its
+A second client is refused: its connection is closed at once and the user is notified. A client that has shut down its
 sending side (`socat - TCP:..` at the end of its input) is there for half a second more, in which it gets answers,
 unless another one comes.
 """
@@ -67,7 +67,7 @@ class TcpEndpoint(Endpoint):
             return b""
         if not data:
             self._input_over_tick = self.port.world.tick
-        return self.heard_from(data)
+        return self.from_client(data)
 
     def push(self) -> None:
         if self._socket is None:
@@ -75,7 +75,7 @@ class TcpEndpoint(Endpoint):
         if not self._wire and self.out:
             taken = self.out.take(CHUNK_BYTES)
             self.bytes_out += len(taken)
-            self._wire += self.said_to(taken)
+            self._wire += self.to_client(taken)
         if self._wire:
             try:
                 del self._wire[: self._socket.send(self._wire)]
@@ -101,11 +101,11 @@ class TcpEndpoint(Endpoint):
     def greet(self) -> None:
         """A client is there."""
 
-    def heard_from(self, data: bytes) -> bytes:
+    def from_client(self, data: bytes) -> bytes:
         """What of the client's bytes is for the radio."""
         return data
 
-    def said_to(self, data: bytes) -> bytes:
+    def to_client(self, data: bytes) -> bytes:
         """How the radio's bytes go to the client."""
         return data
 
@@ -117,7 +117,7 @@ class TcpEndpoint(Endpoint):
 
     def _accept(self) -> None:
         try:
-            found, address = self._listener.accept()
+            accepted, address = self._listener.accept()
         except (BlockingIOError, ConnectionError):
             return
         client = f"{address[0]}:{address[1]}"
@@ -125,13 +125,13 @@ class TcpEndpoint(Endpoint):
             self._put_out()
         if self._socket is not None:
             self.refused += 1
-            found.close()
+            accepted.close()
             self.tell(f"{self.name}: {client} is refused; {self.client} is there")
             return
-        found.setblocking(False)
-        found.setsockopt(socket.IPPROTO_TCP, socket.TCP_NODELAY, 1)
-        _keep_alive(found)
-        self._socket = found
+        accepted.setblocking(False)
+        accepted.setsockopt(socket.IPPROTO_TCP, socket.TCP_NODELAY, 1)
+        _keep_alive(accepted)
+        self._socket = accepted
         self._input_over_tick = -1
         self._wire = bytearray()
         self.has_come(client)
@@ -152,9 +152,9 @@ class TcpEndpoint(Endpoint):
             self.watch(self._socket, reads, writes=bool(self._wire))
 
 
-def _keep_alive(found: socket.socket) -> None:
+def _keep_alive(client: socket.socket) -> None:
     """A client that vanished without a word is gone after a minute: nobody else could come as long as it is there."""
-    found.setsockopt(socket.SOL_SOCKET, socket.SO_KEEPALIVE, 1)
+    client.setsockopt(socket.SOL_SOCKET, socket.SO_KEEPALIVE, 1)
     for name, value in (
         ("TCP_KEEPIDLE", 30),
         ("TCP_KEEPINTVL", 10),
@@ -162,4 +162,4 @@ def _keep_alive(found: socket.socket) -> None:
         ("TCP_USER_TIMEOUT", 60_000),  # ms; while an answer is on its way, the kernel does not probe
     ):
         if hasattr(socket, name):
-            found.setsockopt(socket.IPPROTO_TCP, getattr(socket, name), value)
+            client.setsockopt(socket.IPPROTO_TCP, getattr(socket, name), value)

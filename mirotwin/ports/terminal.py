@@ -2,8 +2,8 @@
 
 The kernel tells whether anybody has it open, not how many: two programs that open it share what comes, as they would a
 real port. It is raw, without echo, at 9600 baud, and made so again whenever it was closed; a terminal takes any baud
-rate, and one that is not the radio's is told once, because no rate has an effect here. What a program has not read when
-it closes is gone.
+rate, and one that is not the radio's is reported once, because no rate has an effect here. What a program has not read
+when it closes is gone.
 """
 
 from __future__ import annotations
@@ -50,7 +50,7 @@ class PtyEndpoint(Endpoint):
         super().__init__(context, self.path if link is None else f"{link}")
         self._poll = select.poll()
         self._poll.register(self._master, select.POLLIN)
-        self._told = False
+        self._reported = False
 
     def _make_raw(self) -> None:
         self._tty.setraw(self._master)
@@ -69,11 +69,16 @@ class PtyEndpoint(Endpoint):
             os.close(self._master)
             if self._lock is not None:
                 _unlock(link, self._lock)
-            what = "is there already" if isinstance(error, FileExistsError) else f"{error.strerror or error}"
+            reason = (
+                "is there already" if isinstance(error, FileExistsError) else f"{error.strerror or error}"
+            )
             remedy = "choose another link with --pty, or replace a link to a terminal with --force"
             if isinstance(error, BlockingIOError):
-                what, remedy = "another session serves it", "end that one, or choose another link with --pty"
-            raise BadInput(link, "", what, remedy) from None
+                reason, remedy = (
+                    "another session serves it",
+                    "end that one, or choose another link with --pty",
+                )
+            raise BadInput(link, "", reason, remedy) from None
         self._link = link
 
     def receive(self) -> bytes:
@@ -84,9 +89,9 @@ class PtyEndpoint(Endpoint):
         is_open = not events & select.POLLHUP
         was_there = bool(self.client)
         if not was_there and (data or is_open):
-            self._told = False
+            self._reported = False
             self.has_come(SOMEBODY)
-        if data and not self._told:
+        if data and not self._reported:
             self._tell_speed()
         if was_there and not is_open and not events & select.POLLIN:
             self._hang_up()
@@ -94,7 +99,7 @@ class PtyEndpoint(Endpoint):
         return data
 
     def _tell_speed(self) -> None:
-        self._told = True
+        self._reported = True
         if self._termios.tcgetattr(self._master)[5] != self._termios.B9600:
             self.tell(f"{self.name}: {SOMEBODY} has set another baud rate; the radio has 9600")
 

@@ -44,7 +44,7 @@ def parse_url(url: str) -> UrlOptions:
     scenario = unquote(name.rstrip("/") if not name.endswith(".toml") else name)
     if not scenario:
         raise BadInput(url, "", "names no scenario", f"give {SCHEME}fig6, for example")
-    found: dict[str, Any] = {}
+    options: dict[str, Any] = {}
     settings: list[str] = []
     for part in query.split("&") if query else ():
         key, _, value = (unquote(word) for word in part.partition("="))
@@ -54,13 +54,13 @@ def parse_url(url: str) -> UrlOptions:
         if key not in _MOST:
             known = ", ".join(["set", *_MOST])
             raise BadInput(url, key, "is no option of the URL", f"there are {known}")
-        if key in found:
+        if key in options:
             raise BadInput(url, key, "stands twice", "give it once")
         try:
-            found[key] = _read(value, _MOST[key])
+            options[key] = _read(value, _MOST[key])
         except ValueError as error:
             raise BadInput(url, key, f"{value!r} {error}") from None
-    return UrlOptions(scenario, settings=tuple(settings), **found)
+    return UrlOptions(scenario, settings=tuple(settings), **options)
 
 
 _MOST: dict[str, int | float | None] = {

@@ -75,7 +75,7 @@ class Stops:
             if world.in_period:
                 world.run_to(world.period_end)
             self.resumed, self.begin_tick = world.save(), world.tick
-            for robot in world.robots:  # what was told before is no record of this run
+            for robot in world.robots:  # what was logged before belongs to no record of this run
                 robot.board.left.commands.clear()
                 robot.board.right.commands.clear()
         self._check(world)
@@ -83,13 +83,13 @@ class Stops:
     def _check(self, world: World) -> None:
         end_tick = world.periods * world.period_ticks
         to_tick = end_tick if self.to_tick is None else self.to_tick
-        asked = [("--save-at", tick, to_tick) for tick in self.save_ticks]
+        requested = [("--save-at", tick, to_tick) for tick in self.save_ticks]
         if self.to_tick is not None:
-            asked.insert(0, ("--to", to_tick, end_tick))
-        for option, tick, last in asked:
+            requested.insert(0, ("--to", to_tick, end_tick))
+        for option, tick, last in requested:
             if not world.tick < tick <= last:
-                what = f"the run goes from {at(world.tick)} to {at(last)}"
-                raise BadInput("", f"{option} {tick}t ({in_ms(tick)})", what, "give a time between")
+                reason = f"the run goes from {at(world.tick)} to {at(last)}"
+                raise BadInput("", f"{option} {tick}t ({in_ms(tick)})", reason, "give a time between")
 
     def move(self, world: World, folder: OutputFolder) -> None:
         """Runs the world to its end, or to `to_tick`."""

@@ -25,8 +25,8 @@ class ScenariosGroup(LazyGroup):
     ) -> tuple[str | None, click.Command | None, list[str]]:
         name = args[0]
         if name in scenario_file.builtin_names() or name.endswith(".toml"):
-            what = f"No such command {shortened(repr(name))}"
-            ctx.fail(f"{what}; did you mean `scenarios show {shortened(name)}`?")
+            reason = f"No such command {shortened(repr(name))}"
+            ctx.fail(f"{reason}; did you mean `scenarios show {shortened(name)}`?")
         return super().resolve_command(ctx, args)
 
 

@@ -61,14 +61,14 @@ def sendable(job: Job, desk: DeskOptions, note: Note) -> list[Transmission]:
     sent, guard = sent_in(job.spec.script or ()), Guard(desk, file)
     if not sent:
         raise BadInput(file, "", "no line from host to robot", "nothing can be sent")
-    for one in sent:
-        if one.network:
-            what = f"speaks to network {one.network}, too; a port is the radio of one"
-            raise BadInput(file, f"tick {one.tick}", what, "split the stream")
-        if one.bad_stop:
-            what = "has a character with a bad stop bit, which no serial port sends"
-            raise BadInput(file, f"tick {one.tick}", what, "leave the line out")
-        guard.check(one.data, f"tick {one.tick}")
+    for transmission in sent:
+        if transmission.network:
+            reason = f"speaks to network {transmission.network}, too; a port is the radio of one"
+            raise BadInput(file, f"tick {transmission.tick}", reason, "split the stream")
+        if transmission.bad_stop:
+            reason = "has a character with a bad stop bit, which no serial port sends"
+            raise BadInput(file, f"tick {transmission.tick}", reason, "leave the line out")
+        guard.check(transmission.data, f"tick {transmission.tick}")
     if count := len(job.spec.script or ()) - len(sent):
         actions = amount(count, "action on robots and radios is", "actions on robots and radios are")
         note(f"{file}: {actions} not observable on a port, and left out")
@@ -85,7 +85,7 @@ def send(
 ) -> None:
     """Sends these to the robots at the port, and records that into the folder. Raises BadInput.
 
-    `progress` is told how many ticks of it are over.
+    `progress` gets the number of ticks that are over.
     """
     spec = job.spec
     firmware = job.source.firmware if job.source and spec.image is job.image else b""
@@ -109,8 +109,8 @@ def send(
     of_99, hint = late[len(late) * 99 // 100], ""
     if of_99 > LATE_MS and not port.prompt:
         hint = "; this process may not ask for real-time priority, which would help"
-    told = f"99 % less than {of_99:.2f} ms late, all less than {late[-1]:.2f} ms"
-    note(f"{amount(len(sent), 'transmission')} sent, {told}{hint}")
+    lateness = f"99 % less than {of_99:.2f} ms late, all less than {late[-1]:.2f} ms"
+    note(f"{amount(len(sent), 'transmission')} sent, {lateness}{hint}")
 
 
 def beside_twin(
@@ -130,32 +130,32 @@ def play_at_port(
     left out without changing what follows: the test ends there. Neither passes; they are counted as not observable.
     `folder`: where the recording is left. Raises NotObservable.
     """
-    path, recording, notes, left = text.origin, BytesIO(), list[str](), False
+    path, recording, notes, written = text.origin, BytesIO(), list[str](), False
     with port_for_test(desk, text.scenario, path, notes.append) as port:
         port.record(recording, twin_source(text.scenario, 0, image))
         player = Player(port, steps, path)
         player.play()
         tick = port.tick
     expected = [why_not(port, f"expectation {name}", "inside") for name in text.scenario.expect]
-    said: list[Line] = []
+    reported: list[Line] = []
     if player.failure is not None:
-        said.append(("failed", f"step failed: {player.failure}"))
+        reported.append(("failed", f"step failed: {player.failure}"))
     judged = any(isinstance(step, ConditionStep) for step in player.steps[: player.done])
-    parts = [*(verdict for verdict, _ in said), "passed" if judged else "not observable"]
+    parts = [*(verdict for verdict, _ in reported), "passed" if judged else "not observable"]
     if folder is not None:
         try:
             write_files(folder, {RECORDING: recording.getvalue()}, "choose another folder")
-            left = player.failure is not None
+            written = player.failure is not None
         except (OSError, BadInput) as error:
             notes.append(nothing_left(folder, error))
     return Result(
         path=path,
         verdict=judge(parts),
-        said=[*said, *(("not observable", line) for line in (*player.unseen, *expected, *notes))],
+        said=[*reported, *(("not observable", line) for line in (*player.unseen, *expected, *notes))],
         done=player.done,
         steps=player.count,
         tick=tick,
-        left=str(folder) if left else "",
+        left=str(folder) if written else "",
         left_out=text.notes,
         unseen=player.count - len(player.steps) + len(expected),
     )

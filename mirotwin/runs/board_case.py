@@ -76,15 +76,15 @@ def after_ticks(scenario: BoardScenario) -> int:
 def check_board_script(script: Sequence[ScriptItem], path: str, scenario: BoardScenario) -> None:
     """Raises BadInput for characters that overlap, and for what is done to other devices."""
     free_tick = 0
-    for one in script:
-        if one.network or getattr(one, "slot", 0):
-            raise BadInput(path, f"tick {one.tick}", "is not for the board, which is alone on network 0")
-        if not isinstance(one, Transmission):
+    for item in script:
+        if item.network or getattr(item, "slot", 0):
+            raise BadInput(path, f"tick {item.tick}", "is not for the board, which is alone on network 0")
+        if not isinstance(item, Transmission):
             continue
-        if one.tick < free_tick:
-            what = f"the characters at tick {one.tick} begin before those before them end"
-            raise BadInput(path, "", what, f"leave {free_tick - one.tick} ticks between them")
-        free_tick = one.tick + _duration(one, scenario)
+        if item.tick < free_tick:
+            reason = f"the characters at tick {item.tick} begin before those before them end"
+            raise BadInput(path, "", reason, f"leave {free_tick - item.tick} ticks between them")
+        free_tick = item.tick + _duration(item, scenario)
 
 
 def board_spec(
@@ -106,5 +106,5 @@ def board_spec(
     return RunSpec(scenario=scenario, image=image, script=script, until_tick=until_tick, origin=origin)
 
 
-def _duration(one: ScriptItem, scenario: BoardScenario) -> int:
-    return CHARACTER_BITS * scenario.bit_ticks * len(one.data) if isinstance(one, Transmission) else 0
+def _duration(item: ScriptItem, scenario: BoardScenario) -> int:
+    return CHARACTER_BITS * scenario.bit_ticks * len(item.data) if isinstance(item, Transmission) else 0

@@ -48,11 +48,11 @@ class InspectedRun:
     def over(self) -> bool:
         return self.world.finished or (self.end_tick is not None and self.world.tick >= self.end_tick)
 
-    def tell_pins(self, told: Callable[[int, int, int], object]) -> None:
-        """`told(tick, port, levels)` gets what a file puts on the pins of a board alone; nothing else moves them."""
+    def tell_pins(self, report: Callable[[int, int, int], object]) -> None:
+        """`report(tick, port, levels)` gets what a file puts on the pins of a board alone; nothing else moves them."""
         line = self.world.lines[self.network]
         if isinstance(line, Wire) and line.terminal is not None:
-            line.terminal.pins.told = told
+            line.terminal.pins.told = report
 
     def to(self, tick: int) -> None:
         """Moves on to `tick`, or to the end of the run."""

@@ -53,10 +53,10 @@ LONGEST_TICKS = 86_400 * TICKS_PER_SECOND
 
 def script_of(periods: Iterable[Period]) -> list[ScriptItem]:
     """Everything the hosts of a recording sent, and what was done to robots and radios."""
-    found: list[ScriptItem] = []
+    items: list[ScriptItem] = []
     for period in periods:
-        found += [*period.wire, *period.actions]
-    return script_of_stream(sorted(found, key=lambda one: one.tick))
+        items += [*period.wire, *period.actions]
+    return script_of_stream(sorted(items, key=lambda item: item.tick))
 
 
 def script_of_stream(lines: Iterable[ScriptItem]) -> list[ScriptItem]:
@@ -76,20 +76,22 @@ def check_script(script: Sequence[ScriptItem], scenario: Scenario | None = None)
     """
     networks = MAX_NETWORKS if scenario is None else len(scenario.networks)
     before: dict[int, Transmission] = {}
-    for one in script:
-        if one.network >= networks:
-            raise BadInput("", f"tick {one.tick}", no_network(one.network, networks))
-        if isinstance(one, Transmission):
-            last = before.get(one.network)
-            if last is not None and one.tick < last.end_tick:
-                what = f"starts before the transmission of tick {last.tick} has ended (tick {last.end_tick})"
-                raise BadInput("", f"tick {one.tick}", what, "move it back")
-            before[one.network] = one
-        elif isinstance(one, Reset | Power) and scenario is not None:
-            slots = [robot.slot for robot in scenario.networks[one.network].robot]
-            if one.slot not in slots:
+    for item in script:
+        if item.network >= networks:
+            raise BadInput("", f"tick {item.tick}", no_network(item.network, networks))
+        if isinstance(item, Transmission):
+            last = before.get(item.network)
+            if last is not None and item.tick < last.end_tick:
+                reason = (
+                    f"starts before the transmission of tick {last.tick} has ended (tick {last.end_tick})"
+                )
+                raise BadInput("", f"tick {item.tick}", reason, "move it back")
+            before[item.network] = item
+        elif isinstance(item, Reset | Power) and scenario is not None:
+            slots = [robot.slot for robot in scenario.networks[item.network].robot]
+            if item.slot not in slots:
                 there = f"there is {', '.join(map(str, slots))}"
-                raise BadInput("", f"tick {one.tick}", f"no robot in slot {one.slot}; {there}")
+                raise BadInput("", f"tick {item.tick}", f"no robot in slot {item.slot}; {there}")
 
 
 def robots_of_stream(sent: Iterable[ScriptItem]) -> int:
@@ -113,12 +115,12 @@ def scenario_of_stream(sent: Sequence[ScriptItem], header: Header | None = None)
     scenario = _scenario_of_header(header.scenario)
     check_script(script, scenario)
     end_tick = scenario.end_tick
-    for one in script:
+    for item in script:
         # What was recorded may still be on the air when its run ends.
-        last_tick = one.end_tick if isinstance(one, Transmission) and header.end_tick is None else one.tick
+        last_tick = item.end_tick if isinstance(item, Transmission) and header.end_tick is None else item.tick
         if last_tick > end_tick:
-            what = f"ends at tick {last_tick}, but the scenario ends at tick {end_tick}"
-            raise BadInput("", f"tick {one.tick}", what, "raise its duration_s")
+            reason = f"ends at tick {last_tick}, but the scenario ends at tick {end_tick}"
+            raise BadInput("", f"tick {item.tick}", reason, "raise its duration_s")
     return scenario
 
 
@@ -135,7 +137,7 @@ def _scenario_of_header(scenario: str | dict[str, object]) -> Scenario:
 def _default_scenario(script: Sequence[ScriptItem]) -> Scenario:
     """The default one with ideal links, and its robot in every slot of each network's layout, all at one start.
 
-    Runs for a second longer than the stream, so that the failsafe is seen.
+    Runs for a second longer than the stream, so that the failsafe shows.
     """
     ends = [one.end_tick if isinstance(one, Transmission) else one.tick for one in script]
     end_tick = max(ends) + AFTERMATH_TICKS
@@ -143,7 +145,7 @@ def _default_scenario(script: Sequence[ScriptItem]) -> Scenario:
         last = max(one.tick for one in script)
         raise BadInput("", f"tick {last}", "more than a day", "let the stream start near tick 0")
     count = 1 + max(one.network for one in script)
-    settings = ["camera={kind = 'gaussian'}", "expect={}"]  # nothing steers by it, or is said of it
+    settings = ["camera={kind = 'gaussian'}", "expect={}"]  # nothing steers by it or is expected
     base = load(DEFAULT_SCENARIO, settings).scenario
     model = base.networks[0].robot[0]
     assert isinstance(model.reference, msgspec.Struct)  # parameters of a line
@@ -221,8 +223,10 @@ class Job(msgspec.Struct, frozen=True, kw_only=True):
         """Raises BadInput where the scenario does not expect the check that the case is about."""
         name = self.case.verdict.partition(":")[0]
         if not any(check.name == name for checks in (self.spec.expected or {}).values() for check in checks):
-            what = f"the verdict is of the check {name!r}, which nothing expects"
-            raise BadInput(self.spec.origin, "header", what, "put it into [expect], or take the verdict away")
+            reason = f"the verdict is of the check {name!r}, which nothing expects"
+            raise BadInput(
+                self.spec.origin, "header", reason, "put it into [expect], or take the verdict away"
+            )
 
     def result_of_case(self, run: Run) -> Result:
         """What the checks that it names say this time, or all where it has no verdict."""
@@ -230,8 +234,8 @@ class Job(msgspec.Struct, frozen=True, kw_only=True):
         named = [one.verdict for one in checks.verdicts() if one.name in checks.named]
         verdict = judge(named) if self.case.verdict else checks.verdict()
         why = [line for verdict, line in expectation_lines(checks) if verdict != "failed"]
-        said = result_of_case(self.case.verdict, checks.failures, self.case.changed, verdict, why)
-        return replace(result, verdict=said.verdict, said=said.said, failures=said.failures)
+        outcome = result_of_case(self.case.verdict, checks.failures, self.case.changed, verdict, why)
+        return replace(result, verdict=outcome.verdict, said=outcome.said, failures=outcome.failures)
 
     def judge_case(self, progress: Callable[[int], object] = lambda tick: None) -> Result:
         """Runs a case, or a stream that expects nothing, to its verdict. Raises BadInput."""
@@ -260,7 +264,7 @@ def load_job(
     seed: int | None = None,
     stack_from: int | None = None,
 ) -> Job:
-    """Reads `file` and loads the image that was asked for, recorded, or the robot's own.
+    """Reads `file` and loads the requested image, the recorded one, or the robot's own.
 
     `settings`: keys to set in the recorded scenario, or in the default one. `seed`: instead of its own.
     `stack_from`: where the stack of `firmware` begins.
@@ -278,10 +282,10 @@ def load_job(
     image = _image_for(given, firmware or image_beside(file, header.firmware_sha256), stack_from)
     wanted, notes = header.firmware_sha256, []
     if wanted not in (None, image.sha256):
-        what = f"the stream is for firmware {wanted[:12]}.., this is {image.sha256[:12]}.. ({image.path})"
+        reason = f"the stream is for firmware {wanted[:12]}.., this is {image.sha256[:12]}.. ({image.path})"
         if firmware is None:
-            raise BadInput(file, "header", what, "name the image with --firmware")
-        notes = [f"{file}: {what}"]  # to run another one is what a replay is for
+            raise BadInput(file, "header", reason, "name the image with --firmware")
+        notes = [f"{file}: {reason}"]  # to run another one is what a replay is for
     return replace(_job_of_stream(given, file, settings, image, seed), notes=notes)
 
 
@@ -290,8 +294,8 @@ def _image_for(given: stream.StreamFile, firmware: str | Path | None, stack_from
     if given.header.bare is None:
         return load_firmware(firmware, stack_from=stack_from)
     if firmware is None:
-        what = "is for a bare processor, which has no firmware of its own"
-        raise BadInput(given.source, "", what, "give --firmware IMAGE.ihx")
+        reason = "is for a bare processor, which has no firmware of its own"
+        raise BadInput(given.source, "", reason, "give --firmware IMAGE.ihx")
     return load_firmware(firmware, SPACE_BYTES, stack_from=stack_from)
 
 
@@ -338,13 +342,13 @@ def _stream(data: bytes, path: str) -> stream.StreamFile:
     format, _ = detect(data[:HEAD_BYTES])
     if format == "pcapng":
         line = command_line("export", operand(path), "--out", "NAME.stream")
-        what = "a capture, which cannot be replayed"
-        raise BadInput(path, "offset 0", what, f"make a stream file of it with `{line}`")
+        reason = "a capture, which cannot be replayed"
+        raise BadInput(path, "offset 0", reason, f"make a stream file of it with `{line}`")
     if format == "hex" and _PAIRS.search(data):
         raise BadInput(path, "offset 0", "hex text without times, which cannot be replayed", _WRITE_TIMES)
     if format != "stream" and _BINARY.search(data[:4096]):
-        what = "neither a recording nor a stream file (UTF-8 text)"
-        raise BadInput(path, "offset 0", what, f"give a run.mcap that `mirotwin run` wrote; {_WRITE_TIMES}")
+        reason = "neither a recording nor a stream file (UTF-8 text)"
+        raise BadInput(path, "offset 0", reason, f"give a run.mcap that `mirotwin run` wrote; {_WRITE_TIMES}")
     return stream.decode(data, path)
 
 
@@ -422,9 +426,9 @@ def _job_of_board(
     own: dict[str, Any] = {"expect": dict(header.expect or {})}
     tables = copy.deepcopy(own)
     made = make(tables, settings, path)
-    for one in made:
-        if not one.text.startswith(EXPECT):
-            raise BadInput(path, one.place, "is not for a case of a bare processor", "leave it out")
+    for setting in made:
+        if not setting.text.startswith(EXPECT):
+            raise BadInput(path, setting.place, "is not for a case of a bare processor", "leave it out")
     if seed is not None:
         raise BadInput(path, "--seed", "is not for a case of a bare processor", "leave it out")
     scenario = board_of_stream(given)

@@ -13,7 +13,7 @@ from miro_sim.world.sight import PixelSight
 
 
 class Learnt(msgspec.Struct, frozen=True):
-    """One parameter: as it is, as the host was told, as it uses it at the end, and the filter's standard deviation."""
+    """One parameter: the truth, the host's first and last value, and the filter's standard deviation."""
 
     true: float
     told: float
@@ -37,16 +37,16 @@ class LearntCalibration(msgspec.Struct, frozen=True):
 
 def learnt_calibrations(networks: Sequence[Any]) -> tuple[LearntCalibration, ...]:
     """Of each host that learns. `networks`: those of a world."""
-    found = []
+    learnt = []
     for network in networks:
         learning = network.sight.tracker.learning if isinstance(network.sight, PixelSight) else None
         if learning is not None:
-            found.append(_learnt(network.index, network.sight.camera.lens, learning))
-    return tuple(found)
+            learnt.append(_learnt(network.index, network.sight.camera.lens, learning))
+    return tuple(learnt)
 
 
 def _learnt(network: int, true: Any, learning: Any) -> LearntCalibration:
-    told, learnt, spreads = learning.begun.camera, learning.calibration.camera, learning.spreads()
+    initial, learnt, spreads = learning.begun.camera, learning.calibration.camera, learning.spreads()
     return LearntCalibration(
         network=network,
         worst_told_cm=100.0 * worst_error_m(true, learning.begun),
@@ -54,7 +54,7 @@ def _learnt(network: int, true: Any, learning: Any) -> LearntCalibration:
         marks=learning.used,
         refused=learning.refused,
         parameters={
-            name: Learnt(getattr(true, name), getattr(told, name), getattr(learnt, name), spreads[name])
+            name: Learnt(getattr(true, name), getattr(initial, name), getattr(learnt, name), spreads[name])
             for name in LEARNT
         },
     )
@@ -90,7 +90,7 @@ class LearntWheels(msgspec.Struct, frozen=True):
 
 def learnt_wheels(networks: Sequence[Any]) -> tuple[LearntWheels, ...]:
     """Of each robot whose estimator learns them. `networks`: those of a world."""
-    found = []
+    learnt = []
     for network in networks:
         for robot in network.robots:
             estimate = robot.pilot.command.estimate
@@ -98,8 +98,8 @@ def learnt_wheels(networks: Sequence[Any]) -> tuple[LearntWheels, ...]:
                 chassis = robot.drive.params.chassis
                 left = WheelFactor(chassis.left_radius_factor, estimate[LEFT])
                 right = WheelFactor(chassis.right_radius_factor, estimate[RIGHT])
-                found.append(LearntWheels(network.index, robot.slot, left, right))
-    return tuple(found)
+                learnt.append(LearntWheels(network.index, robot.slot, left, right))
+    return tuple(learnt)
 
 
 def wheels_text(learnt: LearntWheels) -> str:

@@ -18,7 +18,7 @@ from mirotwin.verify.checks.monitors import Checks
 LINES = 5
 """Failures of one check that are listed."""
 Line = tuple[Verdict, str]
-"""What is said, and the verdict that it speaks for."""
+"""A line of text, and the verdict that it supports."""
 
 
 class Result(msgspec.Struct, frozen=True, kw_only=True):
@@ -69,8 +69,8 @@ class Result(msgspec.Struct, frozen=True, kw_only=True):
     @property
     def lines(self) -> tuple[str, ...]:
         """What is wrong: firmware faults first."""
-        wrong = [one for one in self.said if VERDICTS[one[0]].junit in ("failure", "error")]
-        return tuple(text for _, text in sorted(wrong, key=lambda one: one[0] != "fault"))
+        wrong = [line for line in self.said if VERDICTS[line[0]].junit in ("failure", "error")]
+        return tuple(text for _, text in sorted(wrong, key=lambda line: line[0] != "fault"))
 
     @property
     def notes(self) -> tuple[str, ...]:
@@ -134,8 +134,8 @@ def result_of_case(
         fault = next((one for one in failures if one.fault), None)
         if fault not in (None, first):
             lines.append(f"and a firmware fault: {fault}")
-        kept = [first] if fault in (None, first) else [first, fault]
-        return _case("failed" if fault is None else "fault", lines, kept)
+        reported = [first] if fault in (None, first) else [first, fault]
+        return _case("failed" if fault is None else "fault", lines, reported)
     if verdict != "passed":
         return _case(verdict, [*why, *([f"recorded: {recorded}"] if recorded else [])])
     if not recorded:

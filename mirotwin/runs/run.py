@@ -112,7 +112,7 @@ class Run:
                 self.drive(recorder, source.record == "full", keep, move)
 
     def play(self, progress: Callable[[int], object] = lambda tick: None) -> Run:
-        """To its end, which may be within a control period. `progress` is told the tick.
+        """To its end, which may be within a control period. `progress` gets the tick.
 
         Raises TransmissionError for a script that cannot be sent.
         """
@@ -170,16 +170,16 @@ class Run:
     def result(self) -> Result:
         """Its verdict, and the lines of steps, checks and firmware faults."""
         world, player = self.world, self.player
-        said = [line for group in self.judges for line in expectation_lines(group)]
+        lines = [line for group in self.judges for line in expectation_lines(group)]
         if player is not None and player.failure is not None:
-            said.insert(0, ("failed", f"step failed: {player.failure}"))
-        said += fault_lines(world.devices, NEVER_TICK if self.spec.until_tick is None else self.tick)
+            lines.insert(0, ("failed", f"step failed: {player.failure}"))
+        lines += fault_lines(world.devices, NEVER_TICK if self.spec.until_tick is None else self.tick)
         parts = [group.verdict() for group in self.judges]
-        parts += [verdict for verdict, _ in said if verdict in ("fault", "failed")]
+        parts += [verdict for verdict, _ in lines if verdict in ("fault", "failed")]
         return Result(
             path=self.spec.origin,
             verdict=judge(parts),
-            said=said,
+            said=lines,
             failures=[one for group in self.judges for one in group.failures],
             expectations=[one for group in self.judges for one in group.verdicts()],
             done=0 if player is None else player.done,
@@ -194,7 +194,7 @@ class Run:
     # As files
 
     def keep_saved(self, folder: Path) -> None:
-        """Writes what `save` steps kept. Raises OutputError."""
+        """Writes the states of the `save` steps. Raises OutputError."""
         for name, content in (self.player.saved if self.player else {}).items():
             folder.mkdir(parents=True, exist_ok=True)
             with whole_file(folder / name, "--artifacts") as part:
@@ -277,7 +277,7 @@ def robot_spec(
     return RunSpec(
         scenario=msgspec.structs.replace(silent_scenario(settings), expect=dict(expect)),
         image=image,
-        script=sorted(script, key=lambda one: one.tick),
+        script=sorted(script, key=lambda item: item.tick),
         until_tick=-(-until_tick // CONTROL_PERIOD_TICKS) * CONTROL_PERIOD_TICKS,
     )
 

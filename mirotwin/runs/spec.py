@@ -64,8 +64,8 @@ class RunSpec(msgspec.Struct, frozen=True, kw_only=True):
     def robot_scenario(self) -> Scenario:
         """The scenario of robots. Raises BadInput for a board alone."""
         if isinstance(self.scenario, BoardScenario):
-            what = "is for a board alone, which has no robot to show"
-            raise BadInput(self.origin, "", what, "`mirotwin replay` says what it comes to")
+            reason = "is for a board alone, which has no robot to show"
+            raise BadInput(self.origin, "", reason, "`mirotwin replay` says what it comes to")
         return self.scenario
 
     def world(self, image: Image | None = None) -> World:
@@ -90,8 +90,8 @@ class RunSpec(msgspec.Struct, frozen=True, kw_only=True):
         try:
             world.load(self.resumed)
         except ValueError as error:
-            what = f"the recorded run was resumed, and what it went on from fits nothing else: {error}"
-            raise BadInput("", "replay", what, "replay it without --firmware, --set and --seed") from None
+            reason = f"the recorded run was resumed, and what it went on from fits nothing else: {error}"
+            raise BadInput("", "replay", reason, "replay it without --firmware, --set and --seed") from None
 
 
 @lru_cache(64)

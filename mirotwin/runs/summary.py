@@ -229,13 +229,13 @@ def summarise(world: World, tracks: Tracks, wall_s: float, begin_tick: int = 0) 
 def off_pitch_text(summary: Summary) -> str:
     """Which robots left the pitch and for how long, for people; empty if none did."""
     everyone = summary.robots or (RobotTracking(0, -1, summary.tracking),)
-    left = [
-        f"{one.tracking.off_pitch_s:.2f} s"
-        + (f" (net{one.network}/robot{one.slot})" if summary.robots else "")
-        for one in everyone
-        if one.tracking.off_pitch_s
+    off = [
+        f"{robot.tracking.off_pitch_s:.2f} s"
+        + (f" (net{robot.network}/robot{robot.slot})" if summary.robots else "")
+        for robot in everyone
+        if robot.tracking.off_pitch_s
     ]
-    return f"off it for {', '.join(left)} (the pitch has no walls here)" if left else ""
+    return f"off it for {', '.join(off)} (the pitch has no walls here)" if off else ""
 
 
 def vision_text(vision: VisionCounts) -> str:

@@ -41,7 +41,7 @@ def run_test(
     """Runs a file to its verdict; whatever cannot be run is a result, too.
 
     `artifacts`: below it, in a folder of its own, the file leaves what `save` steps keep and, if it fails, its case; a
-    file that saves needs one. `again`: makes the command that gives the verdict again, told whether the file saves.
+    file that saves needs one. `again`: makes the command that gives the verdict again, from whether the file saves.
     `desk`: the port of the robots that are tested, if not their twin.
     """
     folder = None if artifacts is None else folder_of(artifacts, path)
@@ -91,19 +91,19 @@ def _run(
     run.drive(move=run.player.finish if run.player else None)
     run.finish()
     result = replace(run.result(), left_out=text.notes, again=again(bool(saving)))
-    return result if folder is None else _left(run, case, result, folder, text)
+    return result if folder is None else _with_artifacts(run, case, result, folder, text)
 
 
-def _left(run: Run, case: str | None, result: Result, folder: Path, text: ScenarioText) -> Result:
-    """What `save` steps kept, and the case if it failed, stand in the folder now."""
+def _with_artifacts(run: Run, case: str | None, result: Result, folder: Path, text: ScenarioText) -> Result:
+    """The states of the `save` steps, and the case if it failed, are in the folder now."""
     failed = bool(result.lines)
     try:
         run.keep_saved(folder)
         if failed:
-            said = (result.path, *result.lines, *result.notes, report_line(str(folder)), result.again)
+            lines = (result.path, *result.lines, *result.notes, report_line(str(folder)), result.again)
             case = case or (run.case() if run.failures else None)
             files = stream_files(case, run.stream(), run.spec.image)
-            leave(folder, "\n".join((*said, "")), {SCENARIO: encodable(text.text).encode(), **files})
+            leave(folder, "\n".join((*lines, "")), {SCENARIO: encodable(text.text).encode(), **files})
             return replace(result, left=str(folder))
     except (OSError, BadInput) as error:  # the verdict stands, whatever becomes of its files
         with suppress(OSError, BadInput):
@@ -138,17 +138,17 @@ def collect(paths: Sequence[str]) -> list[str]:
 
     Raises BadInput for a path that is not there, and for a file of another kind.
     """
-    found: dict[str, None] = {}
+    files: dict[str, None] = {}
     for path in paths:
         if os.path.isdir(path):
-            found |= dict.fromkeys(_below(path))
+            files |= dict.fromkeys(_below(path))
             continue
         if not os.path.exists(path):
             raise BadInput(path, "", "there is no such file or folder", f"name a folder, or a {KINDS}")
         if not path.endswith((SUFFIX, CASE_SUFFIX)):
             raise BadInput(path, "", f"is no {KINDS}", "rename it; `mirotwin run` takes any scenario")
-        found[path] = None
-    return list(found)
+        files[path] = None
+    return list(files)
 
 
 def _below(folder: str) -> Iterator[str]:

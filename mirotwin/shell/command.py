@@ -135,19 +135,19 @@ class Options(msgspec.Struct, frozen=True, kw_only=True):
             if field.record is not None:
                 yield from value._words()
             elif value != field.default:
-                for one in value if field.several else (value,):
-                    yield from field.words(one)
+                for item in value if field.several else (value,):
+                    yield from field.words(item)
 
     def given(self, *names: str) -> list[str]:
         """The options among the fields of these names (without names: among all) that differ from their defaults."""
-        found = []
+        labels = []
         for field in _fields(type(self)):
             value = getattr(self, field.name)
             if field.record is not None:
-                found += value.given(*names)
+                labels += value.given(*names)
             elif (not names or field.name in names) and value != field.default:
-                found.append(field.label)
-        return found
+                labels.append(field.label)
+        return labels
 
     def refuse(self) -> None:
         """Raises UsageError for options that do not go together."""
@@ -228,12 +228,12 @@ class _Field(NamedTuple):
 
 @cache
 def _fields(record: type[Options]) -> tuple[_Field, ...]:
-    found = []
+    fields = []
     for field in msgspec.structs.fields(record):
         declared = next((one for one in get_args(field.type) if isinstance(one, Argument | Option)), None)
         nested = field.type if declared is None else None
-        found.append(_Field(field.name, declared, nested, field.default, field.required, record.HEADING))
-    return tuple(found)
+        fields.append(_Field(field.name, declared, nested, field.default, field.required, record.HEADING))
+    return tuple(fields)
 
 
 def _parameters(record: type[Options]) -> Iterator[click.Parameter]:

@@ -32,7 +32,7 @@ def plain_table(*names: str, right: Iterable[str] = (), bold: bool = False, **st
 
 
 def facts_table() -> Table:
-    """A table of names and what is to be said of each."""
+    """A table of names and a text for each."""
     table = plain_table("", "", bold=True)
     table.show_header = False
     return table

@@ -1,4 +1,4 @@
-"""Loads the firmware image that a command, a test, a campaign or a port is asked to run, and says when it is up.
+"""Loads the firmware image that a command, a test, a campaign or a port runs, and reports when it is up.
 
 It is up when its serial receiver is on (REN in SCON), which is all that a robot on a radio has to do.
 """
@@ -42,8 +42,8 @@ def load_firmware(
         return image
     known = image.symbols.find(STACK)
     if known is not None:
-        what = f"the .map beside the image begins its stack at {known.address:#04x}"
-        raise BadInput(image.path, "--stack-from", what, "leave the option out, or link with that stack")
+        reason = f"the .map beside the image begins its stack at {known.address:#04x}"
+        raise BadInput(image.path, "--stack-from", reason, "leave the option out, or link with that stack")
     return msgspec.structs.replace(image, symbols=image.symbols.with_stack(stack_from))
 
 
@@ -59,5 +59,5 @@ def is_up(cpu: Cpu) -> bool:
 
 def not_up(image: Image, remedy: str, waited_ms: float = BOOT_MS) -> BadInput:
     """What to raise for firmware that has not come up in time."""
-    what = f"the firmware has not turned its serial receiver on {waited_ms:.0f} ms after power-on"
-    return BadInput(image.path, "", what, remedy)
+    reason = f"the firmware has not turned its serial receiver on {waited_ms:.0f} ms after power-on"
+    return BadInput(image.path, "", reason, remedy)

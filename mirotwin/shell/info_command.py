@@ -76,12 +76,12 @@ def _broken_modules(active: str) -> list[str]:
 
     Uncompiled, what has no `.py` is not used and cannot be imported.
     """
-    found = []
+    problems = []
     for name, source in engines.install().sources.items():
         if active == "python" and source.suffix != ".py":
             continue
         try:
             importlib.import_module(name)
         except ImportError as error:
-            found.append(str(error))
-    return found
+            problems.append(str(error))
+    return problems

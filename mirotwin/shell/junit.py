@@ -44,20 +44,20 @@ def junit_xml(suite: str, cases: Sequence[TestCase], properties: Mapping[str, st
     )
     _properties(within, properties)
     for case in cases:
-        one = ElementTree.SubElement(
+        element = ElementTree.SubElement(
             within,
             "testcase",
             classname=one_line(case.classname),
             name=one_line(case.name),
             **_time(case.time_s),
         )
-        _properties(one, case.properties)
+        _properties(element, case.properties)
         if case.verdict != "passed":
             message = one_line(case.lines[0]) if case.lines else case.verdict
-            said = ElementTree.SubElement(one, case.verdict, message=message)
-            said.text = "\n".join(map(one_line, case.lines))
+            outcome = ElementTree.SubElement(element, case.verdict, message=message)
+            outcome.text = "\n".join(map(one_line, case.lines))
         elif case.lines:
-            ElementTree.SubElement(one, "system-out").text = "\n".join(map(one_line, case.lines))
+            ElementTree.SubElement(element, "system-out").text = "\n".join(map(one_line, case.lines))
     ElementTree.indent(top)
     content: bytes = ElementTree.tostring(top, encoding="utf-8", xml_declaration=True)
     return content + b"\n"

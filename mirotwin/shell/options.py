@@ -57,7 +57,7 @@ class PathType(click.Path):
         if value == "":
             self.fail("the path is empty.", param, ctx)
         if ctx is not None and any(
-            value in one.opts for one in ctx.command.params if isinstance(one, click.Option)
+            value in option.opts for option in ctx.command.params if isinstance(option, click.Option)
         ):
             self.fail(f"the path is missing before {value}; a file of this name is ./{value}.", param, ctx)
         return super().convert(value, param, ctx)
@@ -153,8 +153,8 @@ Engine = Annotated[
 def refuse_steps(scenario: Scenario, origin: str) -> None:
     """For commands that run a scenario without its steps: raises BadInput if it has any."""
     if scenario.step:
-        what = f"has {amount(len(scenario.step), 'step')}, which only `mirotwin run` and `mirotwin test` do"
-        raise BadInput(origin, "step", what, "run it, and give the run.mcap that it writes")
+        reason = f"has {amount(len(scenario.step), 'step')}, which only `mirotwin run` and `mirotwin test` do"
+        raise BadInput(origin, "step", reason, "run it, and give the run.mcap that it writes")
 
 
 @contextmanager
@@ -166,7 +166,7 @@ def plain_parameters(label: str, done: str = "run") -> Iterator[None]:
     try:
         yield
     except DomainError as error:
-        what = f"cannot be {done}: {error}; the parameters are far outside those of a real robot"
-        raise BadInput(label, "", what) from None
+        reason = f"cannot be {done}: {error}; the parameters are far outside those of a real robot"
+        raise BadInput(label, "", reason) from None
     except PluginError as error:
         raise BadInput(label, "", f"cannot be {done}: {error.what}", error.remedy) from error

@@ -28,8 +28,8 @@ FULL = (errno.ENOSPC, errno.EDQUOT, errno.EFBIG)
 class OutputError(BadInput):
     """A folder that cannot be written to: `path`, what, remedy."""
 
-    def __init__(self, path: Path, what: str, remedy: str) -> None:
-        super().__init__(path, "", what, remedy)
+    def __init__(self, path: Path, reason: str, remedy: str) -> None:
+        super().__init__(path, "", reason, remedy)
 
 
 def part_name(name: str) -> str:
@@ -160,12 +160,12 @@ def entries(path: Path, option: str) -> list[str]:
         present = sorted(os.listdir(path))
     except FileNotFoundError:
         if path.is_symlink():
-            what = f"is a symbolic link to {os.readlink(path)}, which does not exist"
-            raise OutputError(path, what, "make that folder, or remove the link") from None
+            reason = f"is a symbolic link to {os.readlink(path)}, which does not exist"
+            raise OutputError(path, reason, "make that folder, or remove the link") from None
         return []
     except OSError as error:
-        what = "exists and is not a folder" if isinstance(error, NotADirectoryError) else reason_of(error)
-        raise OutputError(path, what, remedy) from None
+        reason = "exists and is not a folder" if isinstance(error, NotADirectoryError) else reason_of(error)
+        raise OutputError(path, reason, remedy) from None
     if not os.access(path, os.W_OK | os.X_OK):
         raise OutputError(path, "the folder cannot be written to", remedy)
     return present
@@ -182,8 +182,8 @@ def _check(path: Path, force: bool, names: Sequence[str], ours: bool) -> None:
     finished = ours and RECORDING in present and not parts
     if present and not force and not finished:
         if parts:
-            what = f"the folder holds parts of an interrupted command ({some(sorted(parts))})"
-            raise OutputError(path, what, _ways_out(names))
+            reason = f"the folder holds parts of an interrupted command ({some(sorted(parts))})"
+            raise OutputError(path, reason, _ways_out(names))
         raise not_empty(path, present, _ways_out(names))
     for name in (*names, *map(part_name, names)):
         if (path / name).is_dir():
@@ -211,8 +211,8 @@ def check_file(path: Path, option: str, *inputs: str | Path | None) -> None:
     if path.is_dir():
         raise OutputError(path, "is a folder", remedy)
     if path.is_symlink() and not path.exists():
-        what = f"is a symbolic link to {os.readlink(path)}, which does not exist"
-        raise OutputError(path, what, remedy)
+        reason = f"is a symbolic link to {os.readlink(path)}, which does not exist"
+        raise OutputError(path, reason, remedy)
     if path.exists() and not path.is_file():
         raise OutputError(path, "exists and is not a regular file", remedy)
     if path.exists() and not os.access(path, os.W_OK):

@@ -68,9 +68,9 @@ def tell_notes(notes: Iterable[str]) -> None:
     complain(*(f"note: {note}" for note in notes))
 
 
-def report_lines(said: Iterable[tuple[str, str]]) -> int:
+def report_lines(reported: Iterable[tuple[str, str]]) -> int:
     """Says on stderr what speaks for which verdict; returns the exit code of all together."""
-    lines = list(said)
+    lines = list(reported)
     complain(*(text for _, text in lines))
     return exit_code(*(verdict for verdict, _ in lines))
 
@@ -89,14 +89,14 @@ def _report(error: Exception) -> str:
     return f"internal error: {text}; {ask}"
 
 
-def _said(error: click.UsageError) -> str:
+def _in_words(error: click.UsageError) -> str:
     """What is wrong, in the house's words where an option's name is."""
     if not isinstance(error, click.NoSuchOption) or error.ctx is None:
         return error.format_message()
     names = [name for one in error.ctx.command.get_params(error.ctx) for name in one.opts]
     hint = did_you_mean(error.option_name, [name for name in names if name.startswith("--")])
-    what = f"No such option {shortened(repr(error.option_name))}"
-    return f"{what}; {hint}" if hint else f"{what}."
+    reason = f"No such option {shortened(repr(error.option_name))}"
+    return f"{reason}; {hint}" if hint else f"{reason}."
 
 
 Handler = Callable[[int, FrameType | None], Any]
@@ -167,12 +167,12 @@ class LazyGroup(click.Group):
         return [*self.listed, *super().list_commands(ctx)]
 
     def get_command(self, ctx: click.Context, cmd_name: str) -> click.Command | None:
-        found = self.listed.get(cmd_name)
-        if not isinstance(found, Lazy):
-            return found or super().get_command(ctx, cmd_name)
-        command = getattr(import_module(f"mirotwin.{found.module}"), cmd_name)
+        listed = self.listed.get(cmd_name)
+        if not isinstance(listed, Lazy):
+            return listed or super().get_command(ctx, cmd_name)
+        command = getattr(import_module(f"mirotwin.{listed.module}"), cmd_name)
         assert isinstance(command, click.Command)
-        command.short_help = found.about
+        command.short_help = listed.about
         return command
 
     def resolve_command(
@@ -252,7 +252,7 @@ class MainGroup(LazyGroup):
             return BAD_INPUT
         except click.UsageError as error:
             path = error.ctx.command_path if error.ctx else prog_name
-            return _ended(BAD_INPUT, f"error: {_said(error)} See `{path} --help`.")
+            return _ended(BAD_INPUT, f"error: {_in_words(error)} See `{path} --help`.")
         except click.ClickException as error:
             return _ended(BAD_INPUT, f"error: {error.format_message()}")
         except BadInput as error:

@@ -70,6 +70,6 @@ class ProgressBar:
         per_s = (done - self.begun) / passed_s
         if self.total is None or per_s <= 0.0:
             return ""
-        left_s = round((self.total - done) / per_s)
-        hours, minutes, left = left_s // 3600, left_s // 60 % 60, left_s % 60
-        return f"{per_s:.1f} {self.unit}/s, {hours}:{minutes:02}:{left:02} left"
+        remaining_s = round((self.total - done) / per_s)
+        hours, minutes, seconds = remaining_s // 3600, remaining_s // 60 % 60, remaining_s % 60
+        return f"{per_s:.1f} {self.unit}/s, {hours}:{minutes:02}:{seconds:02} left"

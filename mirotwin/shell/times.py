@@ -54,24 +54,24 @@ class TimeType(Word):
         self.on_wall = on_wall
 
     def _read(self, word: str) -> Time:
-        said, text = shortened(repr(word)), word.strip()
-        found = SHAPE.fullmatch(text)
-        if found is None or not self._is_unit(found[1], found[2]):
-            raise ValueError(f"{said} is not a time; {self._remedy(found)}.")
-        time = Time(text, Fraction(found[1]) * UNITS_S.get(found[2], 1), found[2] == TICKS)
+        shown, text = shortened(repr(word)), word.strip()
+        match = SHAPE.fullmatch(text)
+        if match is None or not self._is_unit(match[1], match[2]):
+            raise ValueError(f"{shown} is not a time; {self._remedy(match)}.")
+        time = Time(text, Fraction(match[1]) * UNITS_S.get(match[2], 1), match[2] == TICKS)
         if self.positive and not time.value:
-            raise ValueError(f"{said} is no time at all; give more than zero.")
+            raise ValueError(f"{shown} is no time at all; give more than zero.")
         if time.seconds() > self.longest_s:
-            raise ValueError(f"{said} is too long; the longest is {self.longest_s:.0f}s.")
+            raise ValueError(f"{shown} is too long; the longest is {self.longest_s:.0f}s.")
         return time
 
     def _is_unit(self, number: str, unit: str) -> bool:
         return unit in UNITS_S or (unit == TICKS and not self.on_wall and "." not in number)
 
-    def _remedy(self, found: re.Match[str] | None) -> str:
-        if found is None or found[2]:
+    def _remedy(self, match: re.Match[str] | None) -> str:
+        if match is None or match[2]:
             return "write 2s, 20ms, 341us or 5min" + ("" if self.on_wall else ", or 48000t for ticks")
-        number = found[1]
+        number = match[1]
         ticks = "" if self.on_wall else f", {number.partition('.')[0] or 0}t for ticks of the crystal"
         return f"it has no unit: write {number}s for seconds{ticks}"
 

@@ -1,4 +1,4 @@
-"""The one table of verdicts: their order, their exit codes, and what people, JUnit and pages are told.
+"""The one table of verdicts: their order, their exit codes, and the words for people, JUnit and pages.
 
 docs/exit-codes.md, which is written from it (`python -m docs.site.exit_codes`), says when each of them is given.
 """
@@ -47,10 +47,10 @@ INTERRUPTED = SIGNALLED + SIGINT
 def judge(verdicts: Iterable[str], unnamed: Iterable[str] = ()) -> Verdict:
     """The verdict of all together; that of nothing is that it passed.
 
-    `unnamed`: of checks that nobody asked for. One that had no occasion counts as one that cannot be observed.
+    `unnamed`: of checks that nobody requested. One that had no occasion counts as one that cannot be observed.
     """
-    found = {*verdicts, *("not observable" if one == "not judged" else one for one in unnamed)}
-    return next((verdict for verdict in VERDICTS if verdict in found), "passed")
+    reported = {*verdicts, *("not observable" if one == "not judged" else one for one in unnamed)}
+    return next((verdict for verdict in VERDICTS if verdict in reported), "passed")
 
 
 def exit_code(*verdicts: str) -> int:

@@ -45,7 +45,7 @@ class Link(FrameSender):
     def __init__(self, machine: Machine, network: int = 0) -> None:
         super().__init__(machine, network, -1)
         self.answers: list[tuple[int, TelemetryFrame]] = []
-        """(tick, answer) of all that were heard."""
+        """(tick, answer) of all that the PC received."""
         self._waits = Waits(machine)
         self._cursor = Cursor(machine.networks[network].log)
         self._open: list[TelemetryFrame] = []
@@ -155,12 +155,12 @@ class Link(FrameSender):
                     return self._open.pop(place)
             return None
 
-        what = f"no answer{' with ' + filters if fields else ''} within {within / TICKS_PER_MS:g} ms"
-        return self._until(taken, _answer_with(self.network, fields), within, what)
+        missing = f"no answer{' with ' + filters if fields else ''} within {within / TICKS_PER_MS:g} ms"
+        return self._until(taken, _answer_with(self.network, fields), within, missing)
 
     @shown_where_it_was_called
     def expect_bytes(self, pattern: bytes, *, within: int) -> int:
-        """Waits until the PC has heard `pattern`, and returns the tick; what stood before it is taken too."""
+        """Waits until the PC has received `pattern`, and returns the tick; what stood before it is taken too."""
 
         def taken() -> int | None:
             place = bytes(event.value for event in self._characters).find(pattern)
@@ -171,31 +171,36 @@ class Link(FrameSender):
             del self._characters[:end]
             return tick
 
-        what = f"{pattern.hex(' ')} not heard within {within / TICKS_PER_MS:g} ms"
-        return self._until(taken, Heard(network=self.network), within, what, judged=False)
+        missing = f"{pattern.hex(' ')} not heard within {within / TICKS_PER_MS:g} ms"
+        return self._until(taken, Heard(network=self.network), within, missing, judged=False)
 
     def _until(
-        self, taken: Callable[[], T | None], condition: Condition, within: int, what: str, judged: bool = True
+        self,
+        taken: Callable[[], T | None],
+        condition: Condition,
+        within: int,
+        wanted: str,
+        judged: bool = True,
     ) -> T:
         """What `taken` gives now, or after an event of this condition. Raises WaitFailed when the time is over."""
-        begun_tick, left = self.machine.tick, within
-        seen: list[Event] = []
+        begun_tick, remaining = self.machine.tick, within
+        events: list[Event] = []
         while True:
             self._gather()
-            if (found := taken()) is not None:
-                return found
+            if (result := taken()) is not None:
+                return result
             try:
-                seen.append(self._waits.until([condition], left))
+                events.append(self._waits.until([condition], remaining))
             except WaitExpired as expired:
-                raise WaitFailed.of(expired, self.machine, what, begun_tick, seen, judged) from None
-            left = max(0, begun_tick + within - self.machine.tick)
+                raise WaitFailed.of(expired, self.machine, wanted, begun_tick, events, judged) from None
+            remaining = max(0, begun_tick + within - self.machine.tick)
 
     @shown_where_it_was_called
     def expect_silence(self, for_ticks: int) -> None:
         """Lets so much time pass. Raises WaitFailed at the first character that the PC hears meanwhile."""
         begun_tick = self.machine.tick
         end_tick = begun_tick + for_ticks
-        what = f"silence for {for_ticks / TICKS_PER_MS:g} ms"
+        expected = f"silence for {for_ticks / TICKS_PER_MS:g} ms"
         silence = Heard(network=self.network)
         event = None
         while event is None or event.tick <= begun_tick:
@@ -203,13 +208,13 @@ class Link(FrameSender):
                 event = self._waits.until([silence], max(0, end_tick - self.machine.tick))
             except WaitExpired as expired:
                 if expired.tick < end_tick:
-                    raise WaitFailed.of(expired, self.machine, what, begun_tick, judged=False) from None
+                    raise WaitFailed.of(expired, self.machine, expected, begun_tick, judged=False) from None
                 return
         expect = expect_of("never_happens", silence, begun_tick, end_tick)
-        raise WaitFailed(f"{what}: broken", begun_tick, event.tick, [event], expect)
+        raise WaitFailed(f"{expected}: broken", begun_tick, event.tick, [event], expect)
 
     def _gather(self) -> None:
-        """Reads what the PC has heard by now."""
+        """Reads what the PC has received by now."""
         cursor = self._cursor
         for serial, event in cursor.log.since(cursor.next):
             if event.what in ("heard", "answer") and event.tick > self.machine.tick:

@@ -56,17 +56,17 @@ def installed(project: Path) -> str | None:
     """The requirement for what is installed here; None where that is not known, or there no more."""
     try:
         text = metadata.distribution("mirotwin").read_text("direct_url.json")
-        found = msgspec.json.decode(text or "", type=_DirectUrl)
+        origin = msgspec.json.decode(text or "", type=_DirectUrl)
     except (metadata.PackageNotFoundError, msgspec.DecodeError):
         return None
-    inner = f"#subdirectory={found.subdirectory}" if found.subdirectory else ""
-    if found.vcs_info is not None:
-        address = f"{found.vcs_info.vcs}+{found.url}@{found.vcs_info.commit_id}{inner}"
-    elif found.url.startswith("file:"):
-        path = Path(url2pathname(urlsplit(found.url).path))
+    inner = f"#subdirectory={origin.subdirectory}" if origin.subdirectory else ""
+    if origin.vcs_info is not None:
+        address = f"{origin.vcs_info.vcs}+{origin.url}@{origin.vcs_info.commit_id}{inner}"
+    elif origin.url.startswith("file:"):
+        path = Path(url2pathname(urlsplit(origin.url).path))
         return _of_path(path, project) if path.exists() else None
     else:
-        address = f"{found.url}{inner}"
+        address = f"{origin.url}{inner}"
     return f"{PACKAGE} @ {address}" if _ADDRESS.fullmatch(address) else None
 
 

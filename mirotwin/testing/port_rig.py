@@ -1,4 +1,4 @@
-"""What one test works with at a port: the robots there, which are told to stand when it is over."""
+"""What one test works with at a port: the robots there, which get a stop command when it is over."""
 
 from __future__ import annotations
 
@@ -51,8 +51,8 @@ class PortRig:
     def result(self) -> Result:
         names = self.spec.scenario.expect
         lines = [why_not(self.machine, f"expectation {name}", "inside") for name in names]
-        said: list[Line] = [("not observable", line) for line in (*lines, *self.notes)]
-        return Result(verdict="passed", said=said, tick=self.tick)
+        reported: list[Line] = [("not observable", line) for line in (*lines, *self.notes)]
+        return Result(verdict="passed", said=reported, tick=self.tick)
 
     def head(self) -> list[str]:
         return [f"scenario {self.spec.scenario.name}, {at(self.tick)}", f"robots at {self.desk.port}"]

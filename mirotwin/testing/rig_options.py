@@ -39,7 +39,7 @@ class RigOptions(msgspec.Struct, frozen=True):
 
 def _together(marks: Iterable[pytest.Mark]) -> dict[str, Any]:
     """The keys of markers, the innermost one first, put together."""
-    found: dict[str, Any] = {"settings": [], "expect": {}}
+    keys: dict[str, Any] = {"settings": [], "expect": {}}
     for mark in marks:
         if mark.args:
             remedy = f"write scenario={mark.args[0]!r}, or another of {', '.join(KEYS)}"
@@ -47,12 +47,12 @@ def _together(marks: Iterable[pytest.Mark]) -> dict[str, Any]:
         for key, value in mark.kwargs.items():
             _check_key(key, value)
             if key == "settings":
-                found[key] = [*value, *found[key]]
+                keys[key] = [*value, *keys[key]]
             elif key == "expect":
-                found[key] = value | found[key]
+                keys[key] = value | keys[key]
             else:
-                found.setdefault(key, value)
-    return found
+                keys.setdefault(key, value)
+    return keys
 
 
 _TYPES: dict[str, tuple[tuple[type, ...], str]] = {
@@ -70,11 +70,11 @@ def _check_key(key: str, value: Any) -> None:
     if key not in KEYS:
         remedy = did_you_mean(key, KEYS, f"there are {', '.join(KEYS)}")
         raise BadInput("", MARKER, f"there is no key {key!r}", remedy)
-    types, what = _TYPES[key]
+    types, allowed = _TYPES[key]
     if not isinstance(value, types) or (key == "seed" and isinstance(value, bool)):
-        raise BadInput("", MARKER, f"{key}={value!r}", f"give {what}")
+        raise BadInput("", MARKER, f"{key}={value!r}", f"give {allowed}")
     if isinstance(value, list | tuple) and not all(isinstance(one, str) and "=" in one for one in value):
-        raise BadInput("", MARKER, f"settings={value!r}", f"give {what}")
+        raise BadInput("", MARKER, f"settings={value!r}", f"give {allowed}")
 
 
 def rig_options(
@@ -90,8 +90,9 @@ def rig_options(
     mark = _together(marks)
     scenario = _scenario(mark.get("scenario"), mark["settings"], folder)
     if scenario.step:
-        what = f"scenario {scenario.name} has {amount(len(scenario.step), 'step')}, which a test in Python does not do"
-        raise BadInput("", MARKER, what, "pytest collects *.scenario.toml files by themselves")
+        steps = amount(len(scenario.step), "step")
+        reason = f"scenario {scenario.name} has {steps}, which a test in Python does not do"
+        raise BadInput("", MARKER, reason, "pytest collects *.scenario.toml files by themselves")
     image = load_firmware(_near(mark["firmware"], folder) if "firmware" in mark else firmware)
     scenario = msgspec.structs.replace(scenario, expect={**scenario.expect, **mark["expect"]})
     boot = mark.get("boot", all(one.host == "silent" for one in scenario.networks))

@@ -29,7 +29,7 @@ Mode = Literal["drive", "stop", "off"]
 
 
 class WheelState(msgspec.Struct, frozen=True):
-    """One wheel now. `mode`: what its LM629 was told to do; `commanded`: the velocity, in 1/256 count per sample as a
+    """One wheel now. `mode`: the command of its LM629; `commanded`: the velocity, in 1/256 count per sample as a
     team frame has it, 0 unless it drives; `speed_m_s`: of the rim, in truth; `pwm`: duty in 1/128, negative backward;
     `position`: counts of the LM629 as of its last sample.
     """
@@ -77,7 +77,7 @@ class RobotUnderTest:
 
     @property
     def wheels(self) -> WheelStates:
-        """What the wheels do now, and what they were told."""
+        """What the wheels do now, and what was commanded."""
         board, chassis = self._robot.board, self._robot.spec.drive.chassis
         left, right = Wheels(track_m=chassis.track_m).split(*self._robot.drive.velocity_at(self.world.tick))
         return WheelStates(_wheel(board.left, left), _wheel(board.right, right))
@@ -115,12 +115,12 @@ class RobotUnderTest:
         condition = Reached(symbol=symbol, address=address, network=self.network, slot=self.slot)
         return self._until(condition, within, f"{place} was not reached")
 
-    def _until(self, condition: Condition, within: int | None, what: str) -> Event:
+    def _until(self, condition: Condition, within: int | None, wanted: str) -> Event:
         try:
             return self._waits.until([condition], within)
         except WaitExpired as expired:
             limit = "" if within is None else f" within {within / TICKS_PER_MS:g} ms"
-            raise WaitFailed.of(expired, self.world, f"{what}{limit}") from None
+            raise WaitFailed.of(expired, self.world, f"{wanted}{limit}") from None
 
     # Its switches
 

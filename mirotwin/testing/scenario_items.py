@@ -54,8 +54,10 @@ class ScenarioItem(pytest.Item):
         if result.verdict == "not observable":
             pytest.skip("; ".join(result.notes))
         if result.verdict != "passed":
-            left = [f"left in {relative(Path(result.left))}"] if result.left else []
-            raise ScenarioFailed("\n".join((*result.lines, *result.notes, f"again: {result.again}", *left)))
+            artifacts = [f"left in {relative(Path(result.left))}"] if result.left else []
+            raise ScenarioFailed(
+                "\n".join((*result.lines, *result.notes, f"again: {result.again}", *artifacts))
+            )
 
     def _note(self, result: Result) -> None:
         self.user_properties += [(f"mirotwin_{name}", value) for name, value in result.facts().items()]

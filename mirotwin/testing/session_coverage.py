@@ -75,8 +75,8 @@ class FirmwareCoverage:
         if hasattr(self.config, "workeroutput"):  # the controller's file has the counts of all
             return
         report = self._report
-        what = self.problem or f"written to {self.out}"
-        terminalreporter.section(f"coverage of {self.image.path.name}, {what}")
+        outcome = self.problem or f"written to {self.out}"
+        terminalreporter.section(f"coverage of {self.image.path.name}, {outcome}")
         console = Console(highlight=False, markup=False, width=TABLE_COLUMNS)
         with console.capture() as capture:
             console.print(table(report.tracefile))

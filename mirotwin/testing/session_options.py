@@ -1,4 +1,4 @@
-"""What a pytest session is told of worlds: its command line and its ini file."""
+"""The options of a pytest session for its worlds: command line and ini file."""
 
 from __future__ import annotations
 
@@ -42,15 +42,15 @@ _OPTIONS: tuple[tuple[str, str, type, str], ...] = (
 def add_options(parser: pytest.Parser) -> None:
     """Makes them known to pytest."""
     group = parser.getgroup("mirotwin", "worlds for tests, firmware coverage (mirotwin)")
-    for name, metavar, kind, what in _OPTIONS:
+    for name, metavar, kind, help_text in _OPTIONS:
         if kind is bool:
-            group.addoption(name, action="store_true", help=what)
+            group.addoption(name, action="store_true", help=help_text)
         elif kind is list:
-            group.addoption(name, metavar=metavar, action="append", default=[], help=what)
+            group.addoption(name, metavar=metavar, action="append", default=[], help=help_text)
         else:
-            group.addoption(name, metavar=metavar, type=kind, help=what)
-    for name, what in _INI.items():
-        parser.addini(name, what, type="string")
+            group.addoption(name, metavar=metavar, type=kind, help=help_text)
+    for name, help_text in _INI.items():
+        parser.addini(name, help_text, type="string")
 
 
 def check_options(config: pytest.Config) -> None:

@@ -40,8 +40,8 @@ def folder() -> Path:
     for place in (_IN_WHEEL, _IN_TREE):
         if place.is_dir():
             return place
-    what = "the examples are not part of this installation"
-    raise BadInput("", "mirotwin", what, "install mirotwin from a wheel or a checkout")
+    reason = "the examples are not part of this installation"
+    raise BadInput("", "mirotwin", reason, "install mirotwin from a wheel or a checkout")
 
 
 def example_files(name: str) -> Iterator[tuple[str, Path]]:
@@ -52,9 +52,9 @@ def example_files(name: str) -> Iterator[tuple[str, Path]]:
     if name == "firmware":
         yield from _images()
         return
-    found = folder() / name
-    if found.is_dir():
-        yield from ((f"{name}/{path.relative_to(found).as_posix()}", path) for path in all_files(found))
+    example = folder() / name
+    if example.is_dir():
+        yield from ((f"{name}/{path.relative_to(example).as_posix()}", path) for path in all_files(example))
     else:
         (path,) = folder().glob(f"{name}.*")
         yield path.name, path
@@ -78,12 +78,12 @@ def project_files(firmware: bool = True) -> Iterator[tuple[str, Path]]:
     """(name in the project, file) of all, in the order of names; with the C sources if `firmware`."""
     of_project, sources = folder() / PROJECT, source_folder()
     if sources is None:
-        what = "the sample project is not part of this installation"
-        raise BadInput("", "mirotwin init", what, "install mirotwin from a wheel or a checkout")
-    found = [(path.relative_to(of_project).as_posix(), path) for path in all_files(of_project)]
+        reason = "the sample project is not part of this installation"
+        raise BadInput("", "mirotwin init", reason, "install mirotwin from a wheel or a checkout")
+    files = [(path.relative_to(of_project).as_posix(), path) for path in all_files(of_project)]
     if firmware:
-        found += [(f"{FIRMWARE}/{path.relative_to(sources).as_posix()}", path) for path in all_files(sources)]
-    yield from sorted(one for one in found if firmware or one[0] != OF_FIRMWARE)
+        files += [(f"{FIRMWARE}/{path.relative_to(sources).as_posix()}", path) for path in all_files(sources)]
+    yield from sorted(file for file in files if firmware or file[0] != OF_FIRMWARE)
 
 
 _LEFT_BEHIND = {"build", "runs", "__pycache__", ".pytest_cache", ".venv", "GNUmakefile"}
@@ -144,15 +144,15 @@ def examples(options: ExamplesOptions) -> None:
     name, folder = options.name, options.folder
     if name is None:
         width = max(map(len, EXAMPLES))
-        for one, about in EXAMPLES.items():
-            click.echo(f"{one:{width}}  {about}")
+        for example, about in EXAMPLES.items():
+            click.echo(f"{example:{width}}  {about}")
         click.echo("write one here: mirotwin examples NAME")
         return
     remedy = "name another folder, or replace with --force"
-    files = {one: path.read_bytes() for one, path in example_files(name)}
+    files = {example: path.read_bytes() for example, path in example_files(name)}
     write(folder, files, remedy, options.force)
-    for one in files:
-        click.echo(folder / one)
+    for example in files:
+        click.echo(folder / example)
     if folder == Path():
         click.echo(f"files written into this folder: {len(files)}")
 

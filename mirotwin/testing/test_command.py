@@ -68,14 +68,14 @@ def test(options: TestOptions) -> int:
         require_bokeh()
     left_out: dict[str, None] = {}
     results: list[Result] = []
-    told: list[TestCase] = []
+    cases: list[TestCase] = []
     as_settings(options.expected)  # cases may name the checks of files, which are known from now on
     for file in chosen:
         began_s = time.perf_counter()
         result = run_file(options, file)
         if result.error is not None:
             show_traceback(result.error)
-        told.append(_test_case(result, time.perf_counter() - began_s))
+        cases.append(_test_case(result, time.perf_counter() - began_s))
         results.append(result)
         tell_notes(note for note in result.left_out if note not in left_out)
         left_out |= dict.fromkeys(result.left_out)
@@ -86,9 +86,9 @@ def test(options: TestOptions) -> int:
             except (OSError, BadInput) as error:
                 show_line(f"    no page: {error}")
     code = _summary(results)
-    if junit is not None:  # the verdicts are told first, whatever becomes of their file
+    if junit is not None:  # the verdicts are printed first, whatever becomes of their file
         with whole_file(junit, "--junit") as part:
-            part.write_bytes(junit_xml("mirotwin", told))
+            part.write_bytes(junit_xml("mirotwin", cases))
     if all(file.endswith(CASE_SUFFIX) for file in chosen):
         _refuse_unused(in_files(options.expected).values(), results)
     return code
@@ -127,11 +127,11 @@ def _show(result: Result, quiet: bool) -> None:
 def _summary(results: Sequence[Result]) -> int:
     """Prints what came of all; returns the exit code."""
     counted = Counter(one.verdict for one in results)
-    found = [verdict for verdict in VERDICTS if counted[verdict]]
-    said = ", ".join(f"{counted[verdict]} {VERDICTS[verdict].counted}" for verdict in found)
+    reported = [verdict for verdict in VERDICTS if counted[verdict]]
+    text = ", ".join(f"{counted[verdict]} {VERDICTS[verdict].counted}" for verdict in reported)
     if unseen := sum(one.unseen for one in results):
-        said += f"; {amount(unseen, 'step or expectation is', 'steps and expectations are')} not observable on a port"
-    show_line(said)
+        text += f"; {amount(unseen, 'step or expectation is', 'steps and expectations are')} not observable on a port"
+    show_line(text)
     return exit_code(*counted)
 
 

@@ -1,4 +1,4 @@
-"""What `mirotwin test` is told, and the command that gives the verdict on one file again."""
+"""The options of `mirotwin test`, and the command that gives the verdict on one file again."""
 
 from __future__ import annotations
 

@@ -45,7 +45,7 @@ class WaitFailed(AssertionError):
         self.seen = list(seen)
         self.expect = expect
         times = f"from {at(begun_tick)} to {at(tick)}"
-        happened = "\n".join(f"  {one}" for one in in_words(seen)[-LAST_LINES:]) or "  nothing"
+        happened = "\n".join(f"  {line}" for line in in_words(seen)[-LAST_LINES:]) or "  nothing"
         count = f", {amount(len(seen), 'event')}" if len(seen) > LAST_LINES else ""
         super().__init__(f"{what}, {times}; meanwhile{count}:\n{happened}")
 
@@ -61,7 +61,7 @@ class WaitFailed(AssertionError):
     ) -> WaitFailed:
         """In words, a wait of the world that ran out. `what`: that did not come, else the conditions themselves.
 
-        `begun_tick`: where it began, if it went on several times; `before`: what was seen until the last one. `judged`:
+        `begun_tick`: where it began, if it went on several times; `before`: the events until the last one. `judged`:
         a check can say the same.
         """
         begun_tick = expired.begun_tick if begun_tick is None else begun_tick
@@ -99,18 +99,18 @@ def _with_frames(events: Sequence[Event]) -> list[Event]:
         if event.what in CHARACTERS:
             wires.setdefault(_place(event), []).append(index)
     replaced: dict[int, Event | None] = {}
-    for (what, _, _), wire in wires.items():
-        decoders: list[Scanner] = [Decoder(3), Decoder(5)] if what == "received" else [TelemetryDecoder()]
+    for (kind, _, _), wire in wires.items():
+        decoders: list[Scanner] = [Decoder(3), Decoder(5)] if kind == "received" else [TelemetryDecoder()]
         for decoder in decoders:
-            at = 0
+            start = 0
             symbols = [(one.value, one.good_stop, one.tick) for one in map(events.__getitem__, wire)]
-            for found in [*decoder.feed_symbols(symbols), *decoder.flush()]:
-                characters = wire[at : at + len(found.data)]
-                at += len(found.data)
-                if isinstance(found, Received):
+            for decoded in [*decoder.feed_symbols(symbols), *decoder.flush()]:
+                characters = wire[start : start + len(decoded.data)]
+                start += len(decoded.data)
+                if isinstance(decoded, Received):
                     replaced.update(dict.fromkeys(characters))
                     last = characters[-1]
-                    replaced[last] = msgspec.structs.replace(events[last], frame=found)
+                    replaced[last] = msgspec.structs.replace(events[last], frame=decoded)
     all_ = (replaced.get(index, event) for index, event in enumerate(events))
     return [one for one in all_ if one is not None]
 
@@ -133,9 +133,9 @@ def _frame_text(event: Event) -> str:
 def _sent_text(event: Event) -> str:
     """`team seq=3 ..`, or the characters."""
     for decoder in (Decoder(3), Decoder(5)):
-        for found in decoder.feed(event.data, event.tick):
-            if isinstance(found, Received) and event.good_stop:
-                return _frame_text(msgspec.structs.replace(event, frame=found)).partition(" ")[2]
+        for decoded in decoder.feed(event.data, event.tick):
+            if isinstance(decoded, Received) and event.good_stop:
+                return _frame_text(msgspec.structs.replace(event, frame=decoded)).partition(" ")[2]
     return event.data.hex(" ").upper()
 
 
@@ -145,15 +145,15 @@ def _place(event: Event) -> tuple[str, int, int]:
 
 def _line(run: Sequence[Event]) -> str:
     first, when = run[0], "tick"
-    _, where, said = f"{first}".split(": ", 2)
+    _, where, text = f"{first}".split(": ", 2)
     if first.frame is not None:
-        said = _frame_text(first)
+        text = _frame_text(first)
     elif first.what == "sent":
-        said += f": {_sent_text(first)}"
+        text += f": {_sent_text(first)}"
     elif len(run) > 1:
         values = " ".join(f"{one.value:02X}{'' if one.good_stop else '!'}" for one in run)
-        said, when = f"{first.what} {values}", "from tick"
-    return f"{first.tick / TICKS_PER_MS:10.3f} ms {where}: {said} ({when} {first.tick})"
+        text, when = f"{first.what} {values}", "from tick"
+    return f"{first.tick / TICKS_PER_MS:10.3f} ms {where}: {text} ({when} {first.tick})"
 
 
 def shown_where_it_was_called(function: Callable[P, T]) -> Callable[P, T]:

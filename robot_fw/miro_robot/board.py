@@ -357,12 +357,12 @@ class Board(ProcessorBoard):
         if self.on_movx_bus:
             self._put_address(address, start)
             self._set_pins(3, self.bank[3] & (0xFF ^ _RD), start + _STROBE)
-        heard = self.data_bank == 0
+        addressed = self.data_bank == 0
         for index in range(self.buffers):
-            heard = heard or address & self.buffer_mask[index] == self.buffer_address[index]
-        value = self.bank[self.data_bank] & self.bus_levels if heard else 0xFF
+            addressed = addressed or address & self.buffer_mask[index] == self.buffer_address[index]
+        value = self.bank[self.data_bank] & self.bus_levels if addressed else 0xFF
         if self.on_movx_bus:
-            if heard:
+            if addressed:
                 self._note_timing(self.left_timing.sampled(tick), self.right_timing.sampled(tick), tick)
             self._set_pins(3, self.bank[3] | _RD, start + _STROBE_ENDS)
             self._set_pins(2, page, start + _PAGE_ENDS)
@@ -411,7 +411,7 @@ class Board(ProcessorBoard):
         self.strobed = self.left.port.writing | self.left.port.reading
         self.strobed |= self.right.port.writing | self.right.port.reading
         due = min(self._next_interrupt(self.left), self._next_interrupt(self.right))
-        # The CPU runs up to the horizon without looking: it has to be told that something may come before.
+        # The CPU runs up to the horizon without looking: it has to know that something may come before.
         if due < self.horizon:  # a reset has begun to end, or a mask has gone
             self.horizon = due
             self.cpu.replan()
@@ -482,7 +482,7 @@ class Board(ProcessorBoard):
     # ---- state --------------------------------------------------------------------------------------------
 
     def after_load(self) -> None:
-        """Works out the HI levels seen and the bus at rest. Raises ValueError for a part at another time."""
+        """Works out the latched HI levels and the bus at rest. Raises ValueError for a part at another time."""
         earliest_tick = self.cpu.cycles * CYCLE_TICKS - _BEHIND_TICKS
         self.left.check_times(earliest_tick)
         self.right.check_times(earliest_tick)

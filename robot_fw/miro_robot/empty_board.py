@@ -308,7 +308,7 @@ class EmptyBoard(ProcessorBoard):
     def pages(self, pages: bytes) -> None:
         """Raises ValueError for what is no list of pages, in order."""
         size = 1 + _PAGE + (_PAGE if self.shared else 0)
-        numbers = [pages[at] for at in range(0, len(pages), size)]
+        numbers = [pages[start] for start in range(0, len(pages), size)]
         if len(pages) % size or numbers != sorted(set(numbers)):
             raise ValueError(f"{len(pages)} bytes are no pages of RAM, in order")
         for page in range(_PAGE):
@@ -319,10 +319,10 @@ class EmptyBoard(ProcessorBoard):
                 self.written[first : first + _PAGE] = bytes(_PAGE)
                 self.touched[page] = 0
         for index, page in enumerate(numbers):
-            first, at = page * _PAGE, index * size + 1
-            self.ram[first : first + _PAGE] = pages[at : at + _PAGE]
+            first, start = page * _PAGE, index * size + 1
+            self.ram[first : first + _PAGE] = pages[start : start + _PAGE]
             if self.shared:
-                self.written[first : first + _PAGE] = pages[at + _PAGE : at + 2 * _PAGE]
+                self.written[first : first + _PAGE] = pages[start + _PAGE : start + 2 * _PAGE]
             self.touched[page] = _OLD
 
     @property
@@ -333,22 +333,22 @@ class EmptyBoard(ProcessorBoard):
     @fresh_pages.setter
     def fresh_pages(self, pages: bytes) -> None:
         """After `pages`. Raises ValueError for what is not of these."""
-        for at in range(0, len(pages), 1 + _PAGE + (_PAGE if self.shared else 0)):
-            if not self.touched[pages[at]]:
-                raise ValueError(f"page {pages[at]} of RAM was not written")
-            self.touched[pages[at]] = _FRESH
+        for start in range(0, len(pages), 1 + _PAGE + (_PAGE if self.shared else 0)):
+            if not self.touched[pages[start]]:
+                raise ValueError(f"page {pages[start]} of RAM was not written")
+            self.touched[pages[start]] = _FRESH
         if self.fresh_pages != pages:
             raise ValueError("the pages written last are not those of RAM")
 
     def _content(self, least: int) -> bytes:
-        found = []
+        pages = []
         for page in range(_PAGE):
             if self.touched[page] >= least:
                 first = page * _PAGE
-                found.append(bytes([page]) + self.ram[first : first + _PAGE])
+                pages.append(bytes([page]) + self.ram[first : first + _PAGE])
                 if self.shared:
-                    found.append(bytes(self.written[first : first + _PAGE]))
-        return b"".join(found)
+                    pages.append(bytes(self.written[first : first + _PAGE]))
+        return b"".join(pages)
 
     def after_load(self) -> None:
         """Code lies where it lay, in RAM if program and data share it."""

@@ -66,9 +66,9 @@ class Actions:
 
     def next_after(self, tick: int) -> int:
         """When the next one is due that is not due at `tick`."""
-        for one in self.waiting:
-            if one.tick > tick:
-                return one.tick
+        for action in self.waiting:
+            if action.tick > tick:
+                return action.tick
         return NEVER_TICK
 
     def announce(self, action: Action) -> None:
@@ -83,45 +83,49 @@ class Actions:
             self.waiting.append(WaitingAction(action.tick, RESET, action.slot, action.level))
         else:
             self.waiting.append(WaitingAction(action.tick, POWER, action.slot, action.on))
-        self.waiting.sort(key=lambda one: one.tick)
+        self.waiting.sort(key=lambda waiting: waiting.tick)
 
     def do_due(self, medium: Medium, tick: int) -> None:
         """Does what is due at `tick`, and notes what robots and PC can notice."""
         while self.waiting and self.waiting[0].tick <= tick:
-            one = self.waiting.pop(0)
-            if one.what == RADIO_DOWN:
-                medium.set_radio(one.value, up=False)
+            action = self.waiting.pop(0)
+            if action.what == RADIO_DOWN:
+                medium.set_radio(action.value, up=False)
                 continue
-            slot = PC if one.what == RADIO_UP else one.slot
-            self.done.append(self._do(medium, one))
+            slot = PC if action.what == RADIO_UP else action.slot
+            self.done.append(self._do(medium, action))
             event = Event(
-                tick=one.tick, what=_EVENTS[one.what], network=self.network, slot=slot, value=one.value
+                tick=action.tick,
+                what=_EVENTS[action.what],
+                network=self.network,
+                slot=slot,
+                value=action.value,
             )
             medium.log.note(event)
 
-    def _do(self, medium: Medium, one: WaitingAction) -> Action:
-        if one.what == RADIO_UP:
-            medium.set_radio(one.value, up=True)
-            return RadioState(one.tick, self.network, LINK_STATES[one.value])
-        board = medium.device(one.slot).board
-        if one.what == RESET:
-            board.set_reset(one.value)
-            return Reset(one.tick, self.network, one.slot, one.value)
-        board.set_power(one.value)
-        return Power(one.tick, self.network, one.slot, one.value)
+    def _do(self, medium: Medium, action: WaitingAction) -> Action:
+        if action.what == RADIO_UP:
+            medium.set_radio(action.value, up=True)
+            return RadioState(action.tick, self.network, LINK_STATES[action.value])
+        board = medium.device(action.slot).board
+        if action.what == RESET:
+            board.set_reset(action.value)
+            return Reset(action.tick, self.network, action.slot, action.value)
+        board.set_power(action.value)
+        return Power(action.tick, self.network, action.slot, action.value)
 
     def check(self, slots: Sequence[int]) -> None:
         """Raises ValueError for a robot that is not in `slots`, and a level other than 0 and 1."""
-        for one in self.waiting:
-            if one.what in (RESET, POWER) and (one.slot not in slots or one.value > 1):
+        for action in self.waiting:
+            if action.what in (RESET, POWER) and (action.slot not in slots or action.value > 1):
                 raise ValueError(
-                    f"an action waits for slot {one.slot} with level {one.value}, at tick {one.tick}"
+                    f"an action waits for slot {action.slot} with level {action.value}, at tick {action.tick}"
                 )
 
     def take(self) -> tuple[Action, ...]:
         """The actions of the period that is over."""
-        found, self.done = tuple(self.done), []
-        return found
+        taken, self.done = tuple(self.done), []
+        return taken
 
     def __repr__(self) -> str:
         return f"Actions(net{self.network}, {self.waiting})"

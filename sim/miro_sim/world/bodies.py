@@ -1,4 +1,4 @@
-"""The robots of a world as bodies on one pitch: which of them touch, seen at the ticks of the contact grid.
+"""The robots of a world as bodies on one pitch: which of them touch, checked at the ticks of the contact grid.
 
 Robots that may touch note where they are at each tick of the grid while they run alone (`Robot.run`). The notes are
 looked at after the piece. Of a pair that is too far apart to touch in it nothing is asked before it could meet. A
@@ -56,10 +56,10 @@ class Bodies:
                 robot.note_from(NEVER_TICK)
         if until_tick < self.next_tick:
             return
-        at = {robot: robot.drive.pose_at(tick) for robot in self.robots}
+        poses = {robot: robot.drive.pose_at(tick) for robot in self.robots}
         for index, (one, other, closing_m_s) in enumerate(self.pairs):
             if self.next_ticks[index] <= until_tick:
-                look_tick = next_look(tick, at[one], at[other], closing_m_s)
+                look_tick = next_look(tick, poses[one], poses[other], closing_m_s)
                 self.next_ticks[index] = look_tick
                 if look_tick <= until_tick:
                     self.looks.append((index, look_tick))
@@ -69,24 +69,24 @@ class Bodies:
 
     def look(self) -> list[tuple[int, Robot, Robot]]:
         """Which pairs have begun to touch in the piece, and when; in the order of time."""
-        found = []
+        touches = []
         for index, tick in self.looks:
             one, other, closing_m_s = self.pairs[index]
             while tick < min(one.grid_tick, other.grid_tick):  # both have noted it
-                at, beside = _noted(one, tick), _noted(other, tick)
+                pose, other_pose = _noted(one, tick), _noted(other, tick)
                 known = (one, other) in self.touching
-                if touch(at, beside) != known:
+                if touch(pose, other_pose) != known:
                     if known:
                         self.touching = [pair for pair in self.touching if pair != (one, other)]
                     else:
                         self.touching = [*self.touching, (one, other)]
-                        found.append((tick, one, other))
-                tick = next_look(tick, at, beside, closing_m_s)
+                        touches.append((tick, one, other))
+                tick = next_look(tick, pose, other_pose, closing_m_s)
             self.next_ticks[index] = tick
         if self.looks:
             self.next_tick = min(self.next_ticks)
-        found.sort(key=itemgetter(0))
-        return found
+        touches.sort(key=itemgetter(0))
+        return touches
 
 
 def _most_m_s(robot: Robot) -> float:

@@ -70,7 +70,7 @@ class Condition(
     def met_by(self, event: Event) -> bool:
         """Whether this event, of the network and slot that are meant, fulfils the condition."""
         return event.what == self.what and all(
-            getattr(self, field) in (None, said(event)) for field, said in self.OF_EVENT.items()
+            getattr(self, field) in (None, value_of(event)) for field, value_of in self.OF_EVENT.items()
         )
 
     def any_of_its_kind(self) -> Self:
@@ -126,10 +126,10 @@ class Answer(Condition, frozen=True, kw_only=True, tag="answer"):
 def answer_of(frame: events.Received) -> TelemetryFrame | None:
     """What an answer says; None for what no robot may say."""
     try:
-        said = frame.message(max(ROBOT_COUNTS))
+        message = frame.message(max(ROBOT_COUNTS))
     except ContentError:
         return None
-    return said if isinstance(said, TelemetryFrame) else None
+    return message if isinstance(message, TelemetryFrame) else None
 
 
 def answer_fields(event: Event) -> dict[str, int | bool]:
@@ -204,7 +204,7 @@ class Command(AtRobot, frozen=True, kw_only=True, tag="command"):
 class WheelSpeeds(AtRobot, frozen=True, kw_only=True, tag="wheels"):
     """The wheels turn as fast as this, by the truth of the drive: the rim's speed.
 
-    A state rather than an event: asked at each sample of the robot's left LM629, every 341 us.
+    A state rather than an event: evaluated at each sample of the robot's left LM629, every 341 us.
     """
 
     left_m_s: SpeedMS | None = None
@@ -271,15 +271,15 @@ class Ended(AtRobot, frozen=True, kw_only=True, tag="ended"):
 
 
 class Touch(Condition, frozen=True, kw_only=True, tag="touch"):
-    """A robot of the network touches another robot on the pitch, seen on the contact grid of 1 ms."""
+    """A robot of the network touches another robot on the pitch, checked on the contact grid of 1 ms."""
 
     needs: ClassVar[Feature | None] = "inside"
 
 
 class When(AtRobot, frozen=True, kw_only=True, tag="when"):
-    """`predicate(device)` is true, asked at each sample of the robot's left LM629, or after each instruction.
+    """`predicate(device)` is true, evaluated at each sample of the robot's left LM629, or after each instruction.
 
-    A board alone is asked each millisecond.
+    For a board alone it is evaluated each millisecond.
 
     `at = "instruction"` is some 70 times slower. The predicate reads the device and changes nothing.
     """

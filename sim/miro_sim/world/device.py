@@ -45,7 +45,7 @@ class Device:
         self.counter_addresses: list[int | None] | None = None
 
     def run(self, tick: int) -> int:
-        """Runs the board to `tick`, watching out for what a wait asked for; not 0 when it stopped early."""
+        """Runs the board to `tick`, watching for the conditions of a wait; not 0 when it stopped early."""
         if self.asked:
             return self._run_asking(tick)
         if self.marks:
@@ -59,17 +59,17 @@ class Device:
         while not stopped and board.cpu.cycles * CYCLE_TICKS < tick:
             now = board.cpu.cycles * CYCLE_TICKS
             sample_tick = self.sample_tick()
-            step_tick = now + 1 if any(at == "instruction" for _, at in self.asked) else sample_tick
+            step_tick = now + 1 if any(when == "instruction" for _, when in self.asked) else sample_tick
             step_tick = min(step_tick, tick)
             stopped = board.run_to_any(self.marks, step_tick)
             reached = board.cpu.cycles * CYCLE_TICKS if step_tick == now + 1 else step_tick
-            for predicate, at in self.asked:
-                if (at == "instruction" or step_tick == sample_tick) and predicate(self):
+            for predicate, when in self.asked:
+                if (when == "instruction" or step_tick == sample_tick) and predicate(self):
                     board.log.note(TRUE, reached, 0, 0)
         return stopped
 
     def sample_tick(self) -> int:
-        """The next tick at which predicates are asked that are not asked after each instruction."""
+        """The next tick for predicates that are not evaluated after each instruction."""
         raise NotImplementedError
 
     def counter(self, index: int) -> int | None:

@@ -96,7 +96,7 @@ class Event(msgspec.Struct, frozen=True, kw_only=True, gc=False):
 class HostLog:
     """The last 4096 events at the PC of one network, with serial numbers as a board's log has them.
 
-    What the host sent, answers and characters become events when they are asked for. `known_tick`: when a symbol is
+    What the host sent, answers and characters become events when they are read. `known_tick`: when a symbol is
     known whose start bit began at a tick. `robots`: of the network.
     """
 
@@ -114,9 +114,9 @@ class HostLog:
     def first(self) -> int:
         return self.end - len(self.kept)
 
-    def note(self, one: Event | Transmission | Received) -> None:
-        self.kept.append(one)
-        self.rare.append((self.end, one))
+    def note(self, record: Event | Transmission | Received) -> None:
+        self.kept.append(record)
+        self.rare.append((self.end, record))
         self.end += 1
 
     def note_heard(self, symbols: Sequence[Symbol]) -> None:
@@ -124,7 +124,7 @@ class HostLog:
         self.end += len(symbols)
 
     def since(self, serial: int, kinds: Collection[str] | None = None) -> list[tuple[int, Event]]:
-        """(serial number, event) of those from `serial` on that are kept; `kinds`: of these alone."""
+        """(serial number, event) of the events still stored from `serial` on; `kinds`: of these alone."""
         first = self.first
         some: Sequence[tuple[int, Event | Transmission | Received | Symbol]]
         if kinds is None or "heard" in kinds:
@@ -133,23 +133,25 @@ class HostLog:
             some = list(takewhile(lambda numbered: numbered[0] >= serial, reversed(self.rare)))[::-1]
         return [(number, self._event(one)) for number, one in some if kinds is None or _kind(one) in kinds]
 
-    def _event(self, one: Event | Transmission | Received | Symbol) -> Event:
-        if isinstance(one, Event):
-            return one
-        if isinstance(one, Transmission):
-            good = not one.bad_stop
-            return Event(tick=one.tick, what="sent", network=self.network, data=one.data, good_stop=good)
-        if not isinstance(one, Received):
-            value, good, start_tick = one
+    def _event(self, record: Event | Transmission | Received | Symbol) -> Event:
+        if isinstance(record, Event):
+            return record
+        if isinstance(record, Transmission):
+            good = not record.bad_stop
+            return Event(
+                tick=record.tick, what="sent", network=self.network, data=record.data, good_stop=good
+            )
+        if not isinstance(record, Received):
+            value, good, start_tick = record
             tick = self.known_tick(start_tick)
             return Event(tick=tick, what="heard", network=self.network, value=value, good_stop=good)
         try:
-            message: Message | None = one.message(self.robots)
+            message: Message | None = record.message(self.robots)
         except ContentError:  # the CRC is good: a firmware that sets bits which the format keeps at 0
             message = None
         slot = message.slot if isinstance(message, TelemetryFrame) else -1
-        tick = self.known_tick(one.last_tick)
-        return Event(tick=tick, what="answer", network=self.network, value=slot, frame=one)
+        tick = self.known_tick(record.last_tick)
+        return Event(tick=tick, what="answer", network=self.network, value=slot, frame=record)
 
     def cut(self, serial: int) -> None:
         """Forgets the events from `serial` on."""
@@ -160,13 +162,13 @@ class HostLog:
             self.rare.pop()
 
 
-def _kind(one: Event | Transmission | Received | Symbol) -> str:
+def _kind(record: Event | Transmission | Received | Symbol) -> str:
     """Of what a host log keeps."""
-    if isinstance(one, Event):
-        return one.what
-    if isinstance(one, Transmission):
+    if isinstance(record, Event):
+        return record.what
+    if isinstance(record, Transmission):
         return "sent"
-    return "answer" if isinstance(one, Received) else "heard"
+    return "answer" if isinstance(record, Received) else "heard"
 
 
 class BoardLog:
@@ -188,13 +190,13 @@ class BoardLog:
         return self.log.end
 
     def since(self, serial: int, kinds: Collection[str] | None = None) -> list[tuple[int, Event]]:
-        """(serial number, event) of those from `serial` on that are kept; `kinds`: of these alone."""
-        found = []
+        """(serial number, event) of the events still stored from `serial` on; `kinds`: of these alone."""
+        events = []
         for number in range(max(serial, self.log.first), self.log.end):
             noted = self.log.event(number)
             if kinds is None or _KINDS[noted[1]] in kinds:
-                found.append((number, _event(*noted, self.network, self.slot)))
-        return found
+                events.append((number, _event(*noted, self.network, self.slot)))
+        return events
 
 
 _KINDS = {
@@ -221,14 +223,14 @@ class Cursor:
 
     @property
     def lost(self) -> int:
-        """Events that were not read and are no longer kept."""
+        """Events that were overwritten before they were read."""
         return max(0, self.log.first - self.next)
 
     def read(self, kinds: Collection[str] | None = None) -> list[tuple[int, Event]]:
         """(serial number, event) of what is new; `kinds`: of these alone."""
-        found = self.log.since(self.next, kinds)
+        events = self.log.since(self.next, kinds)
         self.next = self.log.end
-        return found
+        return events
 
 
 def _event(tick: int, kind: int, code: int, value: int, data: bytes, network: int, slot: int) -> Event:

@@ -65,8 +65,8 @@ class Medium:
         """The device in `slot`. Raises ValueError where there is none."""
         for device in self.devices:
             if device.slot == slot:
-                found: Device = device
-                return found
+                wanted: Device = device
+                return wanted
         there = ", ".join(str(device.slot) for device in self.devices)
         raise ValueError(f"net{self.index} has no robot in slot {slot}; there is {there}")
 
@@ -102,7 +102,7 @@ class Medium:
         raise NotImplementedError
 
     def end_period(self) -> list[Transmission]:
-        """What the host sent and what it heard in the period that is over."""
+        """What the host sent and received in the period that is over."""
         raise NotImplementedError
 
     # Input
@@ -167,8 +167,8 @@ class Medium:
         self.sent = list(sent)
         self.actions.done = list(done)
         self.log.cut(log_end)
-        for device, one in zip(self.devices, devices, strict=True):
-            device.put_back(one)
+        for device, saved in zip(self.devices, devices, strict=True):
+            device.put_back(saved)
 
     def check_times(self, earliest_tick: int, tick: int) -> None:
         """Raises ValueError unless the restored parts are at `tick`, or behind it, not before `earliest_tick`.

@@ -151,20 +151,20 @@ class Network(Medium):
 
     def hear(self, tick: int) -> None:
         """The PC's receiver hears what the robots sent up to `tick`."""
-        heard = self.uplink.receive(tick)
-        if not heard:
+        received = self.uplink.receive(tick)
+        if not received:
             return
-        self.log.note_heard(heard)
-        for found in self.telemetry.receive(heard):
-            if isinstance(found, Received):
-                self.log.note(found)
-        self.heard += heard
+        self.log.note_heard(received)
+        for frame in self.telemetry.receive(received):
+            if isinstance(frame, Received):
+                self.log.note(frame)
+        self.heard += received
 
     def end_period(self) -> list[Transmission]:
-        """What the host sent and what it heard in the period that is over."""
-        found = [*self.sent, *of_symbols(self.heard, UP, self.index)]
+        """What the host sent and received in the period that is over."""
+        transmissions = [*self.sent, *of_symbols(self.heard, UP, self.index)]
         self.heard = []
-        return found
+        return transmissions
 
     def check_action(self, action: Action) -> None:
         if not isinstance(action, RadioState):
@@ -215,9 +215,12 @@ def networks_of(
         Network(spec, scenario, index, seed, image, sent_to(index, script))
         for index, spec in enumerate(scenario.networks)
     ]
-    for one, other in permutations(networks, 2):
-        if one.spec.radio.channel is not None and one.spec.radio.channel == other.spec.radio.channel:
-            one.downlink.overhear(other.downlink)
+    for listener, neighbour in permutations(networks, 2):
+        if (
+            listener.spec.radio.channel is not None
+            and listener.spec.radio.channel == neighbour.spec.radio.channel
+        ):
+            listener.downlink.overhear(neighbour.downlink)
     for network in networks:
         if isinstance(network.sight, PixelSight):
             network.sight.everyone = [robot for each in networks for robot in each.robots]

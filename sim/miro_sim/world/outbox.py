@@ -29,11 +29,11 @@ class Waiting(msgspec.Struct, frozen=True, gc=False):
     origin: int
 
 
-def _split(one: Waiting) -> tuple[int, int, int, bytes]:
+def _split(waiting: Waiting) -> tuple[int, int, int, bytes]:
     """Tick, origin, number of characters; these, and behind them those whose stop bit is bad, as 1 among 0."""
-    sent = one.sent
+    sent = waiting.sent
     stops = bytes(place in sent.bad_stop for place in range(len(sent.data))) if sent.bad_stop else b""
-    return sent.tick, one.origin, len(sent.data), sent.data + stops
+    return sent.tick, waiting.origin, len(sent.data), sent.data + stops
 
 
 def _made(cells: tuple[int, int, int, bytes]) -> Waiting:
@@ -100,17 +100,17 @@ class Outbox:
         if not count or self._end(self.waiting[count - 1].sent) <= sent.tick:  # a long script comes in order
             self.waiting.append(Waiting(sent, INJECTED))
             return
-        for one in self.waiting:
-            old = one.sent
-            if self._overlap(old, sent) and (one.origin == INJECTED or old.tick < sent.tick):
+        for item in self.waiting:
+            old = item.sent
+            if self._overlap(old, sent) and (item.origin == INJECTED or old.tick < sent.tick):
                 busy = f"is busy from tick {old.tick} to {self._end(old)}"
                 size = len(sent.data)
                 raise ValueError(
                     f"tick {sent.tick}: the transmitter {busy}; {size} characters end at tick {self._end(sent)}"
                 )
-        kept = [one for one in self.waiting if not self._overlap(one.sent, sent)]
-        self.dropped += len(self.waiting) - len(kept)
-        self.waiting = kept
+        remaining = [item for item in self.waiting if not self._overlap(item.sent, sent)]
+        self.dropped += len(self.waiting) - len(remaining)
+        self.waiting = remaining
         self.waiting.append(Waiting(sent, INJECTED))
         self.waiting.sort(key=_tick)
 
@@ -131,22 +131,22 @@ class Outbox:
     def after_load(self) -> None:
         """Raises ValueError unless each transmission holds a byte at least and none begins within another."""
         free_tick = 0
-        for place, one in enumerate(self.waiting):
-            sent = one.sent
+        for place, item in enumerate(self.waiting):
+            sent = item.sent
             if sent.tick < free_tick or not sent.data:
                 raise ValueError(
                     f"{len(sent.data)} characters wait for tick {sent.tick}, behind tick {free_tick}"
                 )
             free_tick = self._end(sent)
-            self.waiting[place] = Waiting(msgspec.structs.replace(sent, network=self.network), one.origin)
+            self.waiting[place] = Waiting(msgspec.structs.replace(sent, network=self.network), item.origin)
 
     def _end(self, sent: Transmission) -> int:
         """When the last stop bit is over."""
         return sent.tick + len(sent.data) * self.character_ticks
 
-    def _overlap(self, one: Transmission, other: Transmission) -> bool:
-        return one.tick < self._end(other) and other.tick < self._end(one)
+    def _overlap(self, first: Transmission, second: Transmission) -> bool:
+        return first.tick < self._end(second) and second.tick < self._end(first)
 
 
-def _tick(one: Waiting) -> int:
-    return one.sent.tick
+def _tick(waiting: Waiting) -> int:
+    return waiting.sent.tick

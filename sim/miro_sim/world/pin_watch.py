@@ -41,7 +41,7 @@ class PinWatch:
 
     def take(self, known_tick: int) -> list[Entry]:
         """The edges up to `known_tick` that were not taken yet."""
-        found: list[Entry] = []
+        entries: list[Entry] = []
         network, slot = self.robot_id
         events = self.tap.events
         moved = bisect_right(self.moves, known_tick, key=_BY_TICK)
@@ -57,9 +57,9 @@ class PinWatch:
                 if level != self._shown[pin]:
                     self._shown[pin] = level
                     edge = Event(tick=tick, what="edge", network=network, slot=slot, pin=pin, value=level)
-                    found.append(((tick, network, slot, EDGES + number), edge))
+                    entries.append(((tick, network, slot, EDGES + number), edge))
         del events[:done]
-        return found
+        return entries
 
     def _level(self, pin: str) -> int:
         if pin not in PORT_PINS:

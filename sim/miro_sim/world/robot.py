@@ -61,7 +61,7 @@ class Robot(Device):
         self.noted: list[tuple[float, float, float]] = []
 
     def run(self, tick: int) -> int:
-        """Runs the board to `tick`, watching out for what a wait asked for; not 0 when a firmware fault stopped it."""
+        """Runs the board to `tick`, watching for the conditions of a wait; not 0 when a firmware fault stopped it."""
         while self.grid_tick <= tick:
             stopped = Device.run(self, self.grid_tick)
             if stopped:

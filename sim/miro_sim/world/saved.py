@@ -62,13 +62,13 @@ def opened(saved: bytes, own: Identity) -> bytes:
         raise ValueError("the saved world is damaged: its checksum is wrong")
     _, saver, *hashes, seed = _HEAD.unpack_from(content)
     tables, scenario, firmware = (value.hex() for value in hashes)
-    found = Identity(tables, scenario, firmware, seed)
-    if found.tables != own.tables:
+    identity = Identity(tables, scenario, firmware, seed)
+    if identity.tables != own.tables:
         by = one_line(saver.rstrip(b"\0").decode("ascii", "backslashreplace"))
         raise ValueError(
             f"the saved world has other fields: another version of this program saved it ({by}; this is {version()})"
         )
-    for key, here, there in zip(Identity._fields, own, found, strict=True):
+    for key, here, there in zip(Identity._fields, own, identity, strict=True):
         if here != there:
             raise ValueError(f"the saved world has {key} {there}, this world has {here}")
     return content[_HEAD.size :]

@@ -1,4 +1,4 @@
-"""What a host is told of where its robots are: an exposure of the world in, measurements out, whole frames late.
+"""What a host measures of its robots' places: an exposure of the world in, measurements out, whole frames late.
 
     pixels      robots of all networks -> picture -> tracker -> grabber
     geometric   own robots -> patches through the lens, back through the calibration -> grabber
@@ -72,12 +72,12 @@ class GaussianSight:
         return f"GaussianSight({self.visions!r}, frame={self.frame})"
 
     def expose(self, tick: int) -> Sequence[Posture | None]:
-        found = []
+        measured = []
         for place in range(len(self.visions)):
             vision, noise, body = self.visions[place], self.streams[place], self.bodies[place]
-            found.append(vision.expose(body.drive.pose_at(tick), noise, self.frame))
+            measured.append(vision.expose(body.drive.pose_at(tick), noise, self.frame))
         self.frame += 1
-        return found
+        return measured
 
     def counts(self) -> dict[str, int]:
         return {}
@@ -118,7 +118,7 @@ class SeeingSight:
         return {"frames": self.frame, **{name: getattr(self, name) for name in names}}
 
     def look(self, tick: int) -> list[Sighting | None]:
-        """What is seen in the frame exposed at `tick`."""
+        """What the tracker finds in the frame exposed at `tick`."""
         raise NotImplementedError
 
     def expose(self, tick: int) -> Sequence[Posture | None]:
@@ -127,20 +127,21 @@ class SeeingSight:
         camera, chance = self.camera, self.chances
         if camera.dropped_frames > 0.0 and chance.uniform(first) < camera.dropped_frames:
             self.dropped += 1
-            seen: Sightings | None = (None,) * robots
+            sightings: Sightings | None = (None,) * robots
         elif camera.repeated_frames > 0.0 and chance.uniform(first + 1) < camera.repeated_frames:
             self.repeated += 1
-            seen = None
+            sightings = None
         else:
-            found, share = self.look(tick), camera.lost_robots
+            tracked, share = self.look(tick), camera.lost_robots
             if share > 0.0:
-                found = [
-                    None if chance.uniform(first + 2 + at) < share else found[at] for at in range(robots)
+                tracked = [
+                    None if chance.uniform(first + 2 + robot) < share else tracked[robot]
+                    for robot in range(robots)
                 ]
-            seen = tuple(found)
-            self._count(tick, seen)
+            sightings = tuple(tracked)
+            self._count(tick, sightings)
         self.frame += 1
-        return self.grabber.take(seen)
+        return self.grabber.take(sightings)
 
     def _count(self, tick: int, seen: Sightings) -> None:
         """Compares with the truth, which nobody on the PC can."""
@@ -167,7 +168,7 @@ class SeeingSight:
 
 
 class StaticField:
-    """The error of a calibration alone: postures are read from patches that are seen without error.
+    """The error of a calibration alone: postures are read from patches that are measured without error.
 
     It depends on the posture and nothing else.
     """
@@ -271,20 +272,20 @@ class PixelSight(SeeingSight):
 def calibration_for(camera: keys.SeeingCamera, network: int, seed: int) -> tuple[Calibration, float]:
     """What a host believes about its camera, and by how much that is wrong at worst over the pitch, in m.
 
-    Finding the errors of 1997 takes longer than the rest of a world: a seed's calibration is kept.
+    Finding the errors of 1997 takes longer than the rest of a world: a seed's calibration is cached.
     """
     try:
         calibration = _calibration(camera, network, seed)
         return calibration, kinds.worst_error_m(camera.lens, calibration)
     except ValueError as error:
-        what = f"no calibration of this camera can be so wrong: {error}"
-        raise BadInput("", "camera.calibration_errors", what, "make the errors smaller") from None
+        reason = f"no calibration of this camera can be so wrong: {error}"
+        raise BadInput("", "camera.calibration_errors", reason, "make the errors smaller") from None
 
 
 def _calibration(camera: keys.SeeingCamera, network: int, seed: int) -> Calibration:
     errors = camera.calibration_errors
     if str(camera.calibration) == "1997":
-        found = kinds.drawn_1997(
+        calibration = kinds.drawn_1997(
             camera.lens,
             Stream(seed, f"net{network}/calibration"),
             errors.centre_px,
@@ -293,11 +294,12 @@ def _calibration(camera: keys.SeeingCamera, network: int, seed: int) -> Calibrat
             errors.worst_cm / 100.0,
         )
     else:
-        found = kinds.none(camera.lens) if camera.calibration == "none" else kinds.exact(camera.lens)
+        calibration = kinds.none(camera.lens) if camera.calibration == "none" else kinds.exact(camera.lens)
     ignored = kinds.CalibrationErrors(
-        ignore_height=errors.ignore_height or found.ignore_height, ignore_distortion=errors.ignore_distortion
+        ignore_height=errors.ignore_height or calibration.ignore_height,
+        ignore_distortion=errors.ignore_distortion,
     )
-    return kinds.wrong(found.camera, ignored)
+    return kinds.wrong(calibration.camera, ignored)
 
 
 def sight_of(camera: keys.Camera, bodies: Sequence[Robot], seed: int) -> Sight:

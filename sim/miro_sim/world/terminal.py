@@ -89,9 +89,9 @@ class SerialInput:
         self.fed = 0  # bytes of the first piece that are on their way or received
         self.tail = b""  # of what the program sent, as long as the text waited for
         self.seen: Counter[bytes] = Counter()  # how often each text was sent while it was waited for
-        self.begin_tick = 0  # the first piece begins; NEVER_TICK until its text was seen
+        self.begin_tick = 0  # the first piece begins; NEVER_TICK until its text was sent
         self.char_start = self.char_end = 0  # of the last character, which may be to come
-        self.polls = 0  # reads of P3 seen so far
+        self.polls = 0  # reads of P3 so far
         self.bit_ticks = 0  # as the receiver was last set, 0 while that is not known
         self._arm()
 
@@ -111,16 +111,16 @@ class SerialInput:
 
     @property
     def waiting_for(self) -> bytes:
-        """The text that has to be seen before anything more is sent; empty if none."""
+        """The text that the program has to send before anything more is typed; empty if none."""
         return self.pieces[0].when if self.pieces and self.begin_tick == NEVER_TICK else b""
 
     @property
     def left(self) -> int:
         """Bytes still to be sent."""
-        left = -self.fed
+        remaining = -self.fed
         for piece in self.pieces:
-            left += len(piece.data)
-        return left
+            remaining += len(piece.data)
+        return remaining
 
     @property
     def waits_for_receiver(self) -> bool:
@@ -189,9 +189,9 @@ class SerialInput:
 
     def after_load(self) -> None:
         """Raises ValueError for more characters on their way than the first piece has."""
-        left = len(self.pieces[0].data) if self.pieces else 1
-        if self.fed >= left:
-            raise ValueError(f"{self.fed} characters of {left} were sent")
+        available = len(self.pieces[0].data) if self.pieces else 1
+        if self.fed >= available:
+            raise ValueError(f"{self.fed} characters of {available} were sent")
 
     def _bit_offset(self, number: int) -> int:
         """Ticks from the start of a character to its bit `number`."""
@@ -252,13 +252,13 @@ class PinInput:
 
 def moves(events: tuple[PinEvent, ...]) -> list[tuple[int, int, int]]:
     """Tick, port and all its levels, at each change of a pin that is not RXD."""
-    levels, found = [0xFF] * 4, []
+    levels, changes = [0xFF] * 4, []
     for tick, port, bit, level in events:
         now = levels[port] & (0xFF ^ 1 << bit) | level << bit
         if (port, bit) != RXD and now != levels[port]:
             levels[port] = now
-            found.append((tick, port, now))
-    return found
+            changes.append((tick, port, now))
+    return changes
 
 
 class Terminal:

@@ -28,7 +28,7 @@ SEEN_AT_MOST = 1000
 
 
 class WaitExpired(TimeoutError):
-    """What was asked for at `begun_tick` did not happen in time. `seen`: the last events meanwhile, at most 1000."""
+    """The wait that began at `begun_tick` ran out. `seen`: the last events meanwhile, at most 1000."""
 
     def __init__(
         self, conditions: Sequence[Condition], begun_tick: int, tick: int, why: str, seen: Sequence[Event]
@@ -86,23 +86,23 @@ class Waits:
             raise ValueError(f"within {within}: give a number of ticks that is not negative")
         begun_tick = world.tick
         deadline = NEVER_TICK if within is None else world.tick + within
-        seen: list[Event] = []
+        events: list[Event] = []
         with Watch(world, conditions) as watch:
             self.backlog += watch.true_now()
             self._gather(watch)
-            found = self._consume(watch, world.tick, seen)
+            event = self._consume(watch, world.tick, events)
             piece = FIRST_PIECE_TICKS
-            while found is None:
+            while event is None:
                 if world.finished or world.tick >= deadline:
                     why = "the run ended" if world.finished else f"{within} ticks passed"
-                    raise WaitExpired(conditions, begun_tick, world.tick, why, seen)
+                    raise WaitExpired(conditions, begun_tick, world.tick, why, events)
                 self._run_piece(watch, min(deadline, world.tick + piece))
                 if world.in_period and (world.tick == world.period_end or world.stopped):
                     world.end_period()
-                found = self._consume(watch, world.tick, seen)
+                event = self._consume(watch, world.tick, events)
                 piece *= 2
             self.backlog += watch.edges(beyond=True)
-        return found
+        return event
 
     def _run_piece(self, watch: Watch, until_tick: int) -> None:
         """Runs to `until_tick`, the end of the control period, or the first event that is wanted."""
@@ -141,10 +141,10 @@ class Waits:
         self.world.run_piece(tick)
         self._gather(watch)
 
-    def _consume(self, watch: Watch, until_tick: int, seen: list[Event]) -> Event | None:
+    def _consume(self, watch: Watch, until_tick: int, events: list[Event]) -> Event | None:
         """Takes events out of the backlog, in order, up to `until_tick` or the first that is wanted."""
         self.backlog.sort(key=lambda entry: entry[0])
-        found = None
+        wanted = None
         count = 0
         for key, event in self.backlog:
             if key[0] > until_tick:
@@ -153,12 +153,12 @@ class Waits:
             if event.what == "reached":
                 self.reached[event.network, event.slot] = event.value
             if watch.wants(event):
-                found = event
+                wanted = event
                 break
-            seen.append(event)
+            events.append(event)
         del self.backlog[:count]
-        del seen[:-SEEN_AT_MOST]
-        return found
+        del events[:-SEEN_AT_MOST]
+        return wanted
 
     # What happened
 

@@ -82,10 +82,10 @@ class Watch:
 
         `beyond`: also those that the CPU has made already, in the instruction with which it went past that tick.
         """
-        found: list[Entry] = []
+        entries: list[Entry] = []
         for pins in self.pins:
-            found += pins.take(pins.board.cpu.cycles * CYCLE_TICKS if beyond else self.world.tick)
-        return found
+            entries += pins.take(pins.board.cpu.cycles * CYCLE_TICKS if beyond else self.world.tick)
+        return entries
 
     def _close_pins(self) -> None:
         for pins in self.pins:

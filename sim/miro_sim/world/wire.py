@@ -148,12 +148,12 @@ class Wire(Medium):
             self.output(bytes([value]))
 
     def hear(self, tick: int) -> None:
-        """Everything was heard while the board ran."""
+        """Does nothing: characters were received while the board ran."""
 
     def end_period(self) -> list[Transmission]:
-        found = [*self.sent, *of_symbols(self.heard, UP, self.index, self.character_ticks)]
+        transmissions = [*self.sent, *of_symbols(self.heard, UP, self.index, self.character_ticks)]
         self.heard = []
-        return found
+        return transmissions
 
     def link_counts(self) -> tuple[int, int]:
         return self.transmissions, 0

@@ -191,7 +191,7 @@ class World:
         that begins there (an edge of TXD on the boundary of two cycles). What happens later, also on the same tick, is
         left to the next wait; so is what happened since the last wait, as far as the logs hold it (2048 events a
         robot). Only where the run stops depends on a wait. `within`: ticks after which WaitExpired is raised, with
-        what was seen meanwhile; default: the end of the scenario. Raises ValueError for a network, robot, pin or
+        the events meanwhile; default: the end of the scenario. Raises ValueError for a network, robot, pin or
         symbol that is not there, and for what can never be.
 
             world.run_until(conditions.Answer(slot=0), within=ticks(0.040))
@@ -318,10 +318,12 @@ class World:
         for line in self.lines:
             line.hear(tick)
         if bodies is not None and bodies.pairs:
-            for touch_tick, one, other in bodies.look():
+            for touch_tick, robot, other in bodies.look():
                 there = (other.network, other.slot)
-                touch = Event(tick=touch_tick, what="touch", network=one.network, value=one.slot, other=there)
-                self.lines[one.network].log.note(touch)
+                touch = Event(
+                    tick=touch_tick, what="touch", network=robot.network, value=robot.slot, other=there
+                )
+                self.lines[robot.network].log.note(touch)
 
     def end_period(self) -> None:
         """The records of the period that is over, and its link in the digest chain."""
@@ -359,7 +361,7 @@ class World:
         """The `link` and `vision` parts of the summary, and the counted part of `firmware`, over all robots."""
         devices = self.devices
         cpus = [device.board.cpu for device in devices]
-        seen = [line.vision_counts() for line in self.lines]  # by cameras of one kind
+        counts = [line.vision_counts() for line in self.lines]  # by cameras of one kind
         links = [line.link_counts() for line in self.lines]
         return {
             "link": {
@@ -369,7 +371,7 @@ class World:
                 "frames_stale": _total([device.counter(2) for device in devices]),
                 "bit_errors": _total([errors for _, errors in links]),
             },
-            "vision": {name: _total([one[name] for one in seen]) for name in seen[0]},
+            "vision": {name: _total([part[name] for part in counts]) for name in counts[0]},
             "firmware": {
                 "instructions": _total([cpu.instructions for cpu in cpus]),
                 "machine_cycles": _total([cpu.cycles for cpu in cpus]),

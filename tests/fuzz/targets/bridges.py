@@ -46,15 +46,15 @@ def _negotiation():
             port.greet()
             port.ignored = 0
             port._wire.clear()
-        found = whole.heard_from(data)
-        again = b"".join(parts.heard_from(part) for part in pieces(data, cut))
+        found = whole.from_client(data)
+        again = b"".join(parts.from_client(part) for part in pieces(data, cut))
         assert found == again, "cut elsewhere, other bytes pass"
         assert whole._wire == parts._wire, "cut elsewhere, the answers differ"
         assert whole.ignored == parts.ignored, "cut elsewhere, more or less is ignored"
         assert len(whole._manager.suboption or b"") <= LONGEST_SUBOPTION
         assert len(told) <= 2, told
         assert all(line.isprintable() for line in told), told
-        assert other.heard_from(whole.said_to(data)) == data, "escaped and heard, the bytes differ"
+        assert other.from_client(whole.to_client(data)) == data, "escaped and heard, the bytes differ"
         return f"{min(len(found), 3)} bytes, {min(whole.ignored, 3)} ignored, {min(len(whole._wire) // 8, 40)} answers"
 
     return run

@@ -139,14 +139,14 @@ def test_the_kernel_gives_up_a_client_that_has_vanished_whether_answers_are_on_t
 
 def sent_to(port, data):
     """What of a client's bytes goes to the radio, in pieces as TCP may cut them."""
-    return b"".join(port.heard_from(data[at : at + 7]) for at in range(0, len(data), 7))
+    return b"".join(port.from_client(data[at : at + 7]) for at in range(0, len(data), 7))
 
 
 def test_bytes_pass_with_ff_doubled(rig):
     port, _ = rig.connected(Rfc2217Endpoint)
     everything = bytes(range(256))
     assert sent_to(port, everything.replace(IAC, IAC + IAC)) == everything
-    assert port.said_to(everything) == everything.replace(IAC, IAC + IAC)
+    assert port.to_client(everything) == everything.replace(IAC, IAC + IAC)
 
 
 def test_the_rate_is_answered_with_the_one_there_is(rig):
@@ -216,7 +216,7 @@ def test_a_client_that_asks_without_reading_answers_is_put_out(rig):
     port._socket.setsockopt(socket.SOL_SOCKET, socket.SO_SNDBUF, 4096)
     ask = IAC + SB + COM_PORT + b"\7" + IAC + SE
     for _ in range(2000):
-        port.heard_from(ask * 100)
+        port.from_client(ask * 100)
         port.push()
         if not port.client:
             break
