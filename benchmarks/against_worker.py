@@ -29,12 +29,7 @@ MANY = 200
 WARM_PERIODS = 30
 
 PARTS = {
-    "runner": (
-        "mirotwin.runs.runner",
-        "mirotwin.runs.runner",
-        "mirotwin.runs.runner",
-        "mirotwin.runner",
-    ),
+    "runner": ("mirotwin.runs.runner", "mirotwin.recording.runner"),
     "recording": ("mirotwin.recording.recorder",),
     "scenario": ("miro_sim.scenario.file",),
     "world": ("miro_sim.world.world",),
