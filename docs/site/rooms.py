@@ -75,7 +75,7 @@ def _name(folder: Path) -> str:
 
 def _imported(path: Path) -> set[str]:
     """The folders that a module imports from, `commands` for a module that stands in none."""
-    found = set()
+    packages = set()
     for node in ast.walk(ast.parse(path.read_text("utf-8"))):
         names = []
         if isinstance(node, ast.Import):
@@ -89,8 +89,8 @@ def _imported(path: Path) -> set[str]:
                 while inner and not (ROOMS.joinpath(*inner) / "__init__.py").is_file():
                     inner.pop()
                 if inner:
-                    found.add(".".join(inner))
-    return found
+                    packages.add(".".join(inner))
+    return packages
 
 
 def _files(folder: Path) -> list[Path]:

@@ -90,7 +90,7 @@ def described(kind: str, name: str) -> str:
 
 
 described_once = cache(described)
-"""What `described` gave at its first call in this process, which is about when the plug-in was loaded."""
+"""Like `described`, with the sources as this process first read them: later edits do not count."""
 
 
 def differences(

@@ -1,4 +1,4 @@
-"""What the dimmer must keep to, whatever it is sent: a check for `mirotwin fuzz --bare --expect lamps_as_told`."""
+"""A check of the dimmer under any input, for `mirotwin fuzz --bare --expect lamps_as_told`."""
 
 from typing import ClassVar
 

@@ -179,7 +179,7 @@ def _repeated(
 
 
 def _first_period(run: ComparedRun, other: ComparedRun, period: int) -> int:
-    """Up to where nobody need look: the states differ first in that control period, by the recorded digests."""
+    """The control period to search from: the first with different digests, or the one before `period` without them."""
     if not (run.recorded and other.recorded):
         return 0
     for here, there in zip(run.periods, other.periods, strict=False):
