@@ -41,14 +41,14 @@ _TWIN = (
 """Settings of the twin: an ideal radio, and a camera that no controller uses."""
 
 
-def twin_source(scenario: Scenario, seed: int, image: Image, firmware: bytes = b"") -> RunSource:
-    """What the twin of robots at a port is made from; `firmware`: the file of an image that is not on the disk."""
+def twin_source(scenario: Scenario, seed: int, image: Image) -> RunSource:
+    """What the twin of robots at a port is made from."""
     twin = changed(scenario, scenario.name, [*live_settings(scenario), *_TWIN]).scenario
     return RunSource(
         scenario_name=twin.name,
         scenario_text=tomli_w.dumps(tables_of(twin)),
         seed=seed,
-        firmware=firmware or image.path.read_bytes(),
+        firmware=image.content,
         firmware_sha256=image.sha256,
         symbols={name: (at.address, at.space) for name, at in image.symbols.names.items()},
         origin=PORT,
@@ -88,13 +88,12 @@ def send(
     `progress` gets the number of ticks that are over.
     """
     spec = job.spec
-    firmware = job.source.firmware if job.source and spec.image is job.image else b""
     with (
         folder,
         folder.part(RECORDING).open("wb") as stream,
         RobotPort(desk, spec.robot_scenario, spec.origin, note) as port,
     ):
-        port.record(stream, twin_source(spec.robot_scenario, spec.seed, spec.image, firmware))
+        port.record(stream, twin_source(spec.robot_scenario, spec.seed, spec.image))
         port.greet(sent=sent)
         folder.keep = (RECORDING,)  # of a talk that was broken off
         shortest, longest = min(port.delays) / TICKS_PER_MS, max(port.delays) / TICKS_PER_MS

@@ -11,10 +11,14 @@ import re
 import pytest
 import serial
 
+from miro_robot.firmware import image_path
+from miro_robot.image import load_hex
+from miro_sim.scenario.file import load
 from mirotwin.desk.robot_port import PortError, RobotPort
 from mirotwin.recording import reader
 from mirotwin.recording.difference import Difference
 from mirotwin.report.page.port_page import _marks
+from mirotwin.runs.at_port import twin_source
 from tests.mirotwin.desk.rig import PERIOD, ROBOT, stream_text
 from tests.mirotwin.verify.checks.rig import planted
 from tests.mutants.build import build
@@ -262,3 +266,12 @@ def test_a_difference_is_marked_in_the_plot_of_its_channel_and_in_no_other():
     assert _marks(found, 0, "left moved") == [1.0, 2.0]
     assert _marks(found, 0, "flags") == [2.0]
     assert _marks(found, 1, "left moved") == []
+
+
+def test_the_twin_has_the_image_that_was_loaded_also_where_its_file_has_changed_since(tmp_path):
+    file = tmp_path / "mine.ihx"
+    content = image_path().read_bytes()
+    file.write_bytes(content)
+    image = load_hex(file)
+    file.write_bytes(b":00000001FF\n")
+    assert twin_source(load("silent").scenario, 0, image).firmware == content
