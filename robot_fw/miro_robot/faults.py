@@ -22,6 +22,7 @@ class FaultKind(IntEnum):
     LM629_TIMING = 7
     MAIN_LOOP_STARVED = 8
     INTERRUPT_NOT_LEFT = 9
+    NET_CONTENTION = 10
 
 
 STACK_FAULTS = (FaultKind.STACK_OVERFLOW, FaultKind.STACK_UNDERFLOW)
@@ -36,6 +37,7 @@ DESCRIPTIONS = {
     FaultKind.LM629_TIMING: "violated an LM629 bus timing limit",
     FaultKind.MAIN_LOOP_STARVED: "starved its main loop: interrupts took all of 10 ms",
     FaultKind.INTERRUPT_NOT_LEFT: "ended an interrupt routine with RET, not RETI (its level stays blocked)",
+    FaultKind.NET_CONTENTION: "let two outputs of different level drive one net",
 }
 
 

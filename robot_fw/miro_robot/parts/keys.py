@@ -1,0 +1,63 @@
+"""The keys of a part, its pins, and where it is soldered."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, Any, ClassVar, NamedTuple
+
+import msgspec
+
+from miro_exact.rng import Stream
+
+if TYPE_CHECKING:
+    from miro_robot.parts.part import Part
+
+IN, STRONG, OPEN_DRAIN = range(3)
+"""Kinds of pins: an input; drives both levels or lets go; pulls low or lets go."""
+LOW, HIGH, RELEASED = 0, 1, 2
+"""What a part drives a pin with. A pin that was let go, of a driver that lets go, drives nothing."""
+MOST_PINS = 32
+"""A part has 30 at most."""
+
+
+class Pin(NamedTuple):
+    """A pin of a part. `optional`: it need not be connected; `level` is then what the part finds there."""
+
+    name: str
+    kind: int = IN
+    optional: bool = False
+    level: int = 1
+
+
+class Place(msgspec.Struct, frozen=True):
+    """Where a part is soldered: its name on the board, the crystal, its noise, and who shares the nets of its pins.
+
+    `peers`: by pin, the other parts on its net with the index of their pin; parts that are made later are put in before
+    `start`.
+    """
+
+    name: str
+    crystal_hz: int
+    noise: Stream
+    connected: frozenset[int]
+    peers: dict[int, list[tuple[Part, int]]]
+
+
+class PartKeys(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_only=True, tag_field="part"):
+    """Base of the keys of every part. Derive with `frozen=True, kw_only=True, tag="name_of_the_part"`.
+
+    `PINS`: in the order of their numbers. `PUTS`: what a test may put, each with its type, as
+    `Annotated[float, Meta(ge=2.0)]`. `READS`: what it may read, each with a few words. `SHEET`: the maker's sheet.
+    """
+
+    PINS: ClassVar[tuple[Pin, ...]] = ()
+    PUTS: ClassVar[dict[str, Any]] = {}
+    READS: ClassVar[dict[str, str]] = {}
+    SHEET: ClassVar[str] = ""
+
+    @property
+    def name(self) -> str:
+        return str(self.__struct_config__.tag)
+
+    def make(self, place: Place) -> Part:
+        """The part of these keys, soldered to this place."""
+        raise NotImplementedError

@@ -1,0 +1,35 @@
+"""Which pins share a net, as the board builds it."""
+
+from __future__ import annotations
+
+import msgspec
+
+PORT_PINS = 32
+MOST_NETS = 256
+MOST_PARTS = 64
+
+
+class PartPin(msgspec.Struct, frozen=True):
+    """A pin of a part on net `net`, -1 if it is not connected; `inverted`: behind an inverter."""
+
+    net: int = -1
+    inverted: bool = False
+
+
+class Netlist(msgspec.Struct, frozen=True, kw_only=True):
+    """The nets of a board. `names`: by number, for people.
+
+    `ports`: by port pin (8 * port + bit), its net, -1 if nothing else is there. `parts`: by part, in the order of their
+    names, and pin. `pull_ups`, `pull_downs`: nets with a resistor; `highs`, `lows`: tied to VCC, to ground.
+    `latches`: by output latch of MOVX and bit; `buffers`: by input buffer and bit; -1 where nothing is connected.
+    """
+
+    names: tuple[str, ...] = ()
+    ports: tuple[int, ...] = (-1,) * PORT_PINS
+    parts: tuple[tuple[PartPin, ...], ...] = ()
+    pull_ups: tuple[int, ...] = ()
+    pull_downs: tuple[int, ...] = ()
+    highs: tuple[int, ...] = ()
+    lows: tuple[int, ...] = ()
+    latches: tuple[tuple[int, ...], ...] = ()
+    buffers: tuple[tuple[int, ...], ...] = ()
