@@ -11,6 +11,7 @@ were written since the last one, which holds the others.
 from __future__ import annotations
 
 from collections.abc import Callable
+from typing import Any
 
 from miro_exact.clock import CYCLE_TICKS, NEVER_TICK
 from miro_exact.state import FLAG, TICK, Items, Octets
@@ -44,7 +45,7 @@ class EmptyBoard(ProcessorBoard):
     """
 
     HAS_XRAM = True
-    STATE = {
+    STATE: dict[str, Any] = {
         "fault_count": TICK,
         "held": FLAG,
         "powered": FLAG,
@@ -56,7 +57,7 @@ class EmptyBoard(ProcessorBoard):
         "fresh_pages": Octets(_PAGE * (1 + 2 * _PAGE)),
     }
     NOT_HASHED = ("pages",)
-    NOT_STATE = (
+    NOT_STATE: tuple[str, ...] = (
         *("spec", "shared", "image", "loops", "stop_at", "stop_at_end"),
         *("sent", "listening", "input_tick", "forced", "again"),
         *("ram", "memory", "touched", "written", "wrote"),  # what `pages` are made of

@@ -13,7 +13,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 from typing import Any
 
-from miro_exact.clock import CYCLE_TICKS, NEVER_TICK
+from miro_exact.clock import CYCLE_TICKS
 from miro_exact.plugins import PluginError
 from miro_exact.raised import raised
 from miro_robot.board_spec import BoardSpec

@@ -1,7 +1,7 @@
 """A light-emitting diode with its resistor, to VCC or to ground.
 
-    VCC --[R]--|>|-- pin      active low: lit while the pin is low
-    pin --[R]--|>|-- ground   active high
+VCC --[R]--|>|-- pin      active low: lit while the pin is low
+pin --[R]--|>|-- ground   active high
 """
 
 from __future__ import annotations

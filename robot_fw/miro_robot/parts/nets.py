@@ -137,17 +137,18 @@ class Nets:
         """By part, 1 if what it does may come to a port pin, also by way of other parts."""
         nets = {net for net in netlist.ports if net >= 0}
         nets.update(net for buffer in netlist.buffers for net in buffer)
-        reaching: set[int] = set()
-        while True:
-            more = {
+        reaching = [0] * MOST_PARTS
+        more = [-1]
+        while more:
+            more = [
                 index
                 for index, places in enumerate(netlist.parts)
-                if index not in reaching and nets.intersection(place.net for place in places)
-            }
-            if not more:
-                return [int(index in reaching) for index in range(MOST_PARTS)]
-            reaching |= more
-            nets.update(place.net for index in more for place in netlist.parts[index] if place.net >= 0)
+                if not reaching[index] and nets.intersection(place.net for place in places)
+            ]
+            for index in more:
+                reaching[index] = 1
+                nets.update(place.net for place in netlist.parts[index] if place.net >= 0)
+        return reaching
 
     # Beginning, and going on from a saved state
 
@@ -469,12 +470,12 @@ class Nets:
 
     def _too_early(self, index: int, tick: int) -> PluginError:
         reason = f"wants its next event at tick {self.parts[index].next_tick}, which is past"
-        return PluginError(f"{self._place(index, 0, tick)}: {reason}", "set next_tick beyond the tick of the call")
+        return PluginError(
+            f"{self._place(index, 0, tick)}: {reason}", "set next_tick beyond the tick of the call"
+        )
 
     def _ring(self, tick: int) -> PluginError:
-        pins = {
-            index: self.parts[index].moved for index in range(self.part_count) if self.is_moving[index]
-        }
+        pins = {index: self.parts[index].moved for index in range(self.part_count) if self.is_moving[index]}
         where = "; ".join(self._place(index, moved, tick) for index, moved in pins.items())
         return PluginError(f"{where}: a ring without delay: no end after {_WAVES} waves", "give one a delay")
 
