@@ -158,7 +158,7 @@ class WiredBoard(EmptyBoard):
         part: Part = self.parts[self.part_index[name]]
         place = f"part {name!r} ({part.keys.name}), value {key}"
         try:
-            value = part.read(key)
+            value = part.read(key, min(self.cpu.cycles * CYCLE_TICKS, part.next_tick))
         except (Exception, SystemExit) as error:
             raise PluginError(f"{place}: {raised(error)}", "repair the part") from error
         if value != value:

@@ -396,6 +396,9 @@ class Nets:
             part.levels = part.levels & ~bit | (level ^ inverted) << pin
             part.outside = part.outside & ~bit | (self._level(net, low, high) ^ inverted) << pin
             strong = 1 if self.lows[net] > low or self.highs[net] > high else 0
+            if part.senses_drive and part.driven >> pin & 1 != strong:
+                part.pending |= bit
+                self.is_waiting[self.pin_part[place]] = 1
             part.driven = part.driven & ~bit | strong << pin
 
     def _mark(self, net: int) -> None:

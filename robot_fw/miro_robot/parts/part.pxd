@@ -6,7 +6,7 @@ cdef class Part:
     cdef readonly str name
     cdef readonly long long crystal_hz
     cdef public long long next_tick, reach_tick
-    cdef readonly int continuous
+    cdef readonly int continuous, senses_drive
     cdef public unsigned int levels, outside, driven
     cdef public unsigned int pending, moved
     cdef public unsigned char wanted[32]

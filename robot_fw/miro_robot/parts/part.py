@@ -10,7 +10,8 @@ name, with its pins, its values and its sheet as class variables; `make` gives t
 
 A call takes no time. All parts that are called on one tick see the same levels; what they drive takes effect together
 afterwards, and then those are called whose pins have other levels. Time is in ticks of the board's crystal: `ticks(us)`
-converts. A part changes at its events and at edges of its pins only, never because somebody looks at it.
+converts. A part changes at its events and at edges of its pins only, never because somebody looks at it: `read` gets
+the tick and works out from what the part keeps what it is by then.
 """
 
 from __future__ import annotations
@@ -34,11 +35,13 @@ class Part:
 
     STATE: dict[str, Any] = {"next_tick": TICK, "reach_tick": TICK, "drives": ("32B", 0, 2)}
     NOT_STATE: tuple[str, ...] = (
-        *("keys", "place", "name", "crystal_hz", "continuous"),
+        *("keys", "place", "name", "crystal_hz", "continuous", "senses_drive"),
         *("levels", "outside", "driven", "pending", "wanted", "moved"),  # follow from the drives of all
     )
     CONTINUOUS = False
     """Whether it moves on all the time: `advance` is called before each event of a part that is wired to it."""
+    SENSES_DRIVE = False
+    """Whether `changed` is also called when only `is_driven` of a pin changes: a motor that is let go coasts."""
 
     def __init__(self, keys: PartKeys, place: Place) -> None:
         self.keys = keys
@@ -46,6 +49,7 @@ class Part:
         self.name = place.name
         self.crystal_hz = place.crystal_hz
         self.continuous = 1 if self.CONTINUOUS else 0
+        self.senses_drive = 1 if self.SENSES_DRIVE else 0
         self.next_tick = NEVER_TICK
         self.reach_tick = 0  # not later than the next event
         self.levels = self.outside = self.driven = 0
@@ -106,8 +110,12 @@ class Part:
         """A test puts `value`, of the type in `PUTS`, at `tick`."""
         setattr(self, name, value)
 
-    def read(self, name: str) -> float | int | bool | str:
-        """A value in `READS` as it is now; reading changes nothing."""
+    def read(self, name: str, tick: int) -> float | int | bool | str:
+        """A value in `READS` as it is at `tick`; reading changes nothing.
+
+        `tick` is the end of the last instruction, or the part's next event if that comes first: never before a call
+        that the part has had. So a value is the same whoever looks, and however often.
+        """
         value: float | int | bool | str = getattr(self, name)
         return value
 
