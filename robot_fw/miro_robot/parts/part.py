@@ -52,7 +52,11 @@ class Part:
         self.senses_drive = 1 if self.SENSES_DRIVE else 0
         self.next_tick = NEVER_TICK
         self.reach_tick = 0  # not later than the next event
-        self.levels = self.outside = self.driven = 0
+        self.driven = 0
+        self.levels = 0
+        for number, pin in enumerate(keys.PINS):
+            self.levels |= pin.level << number  # where nothing is connected; the nets put the others
+        self.outside = self.levels
         self.pending = 0  # pins that have changed since the last call
         self.moved = 0  # pins that the part has driven since the last wave
         self.wanted = [RELEASED] * 32
