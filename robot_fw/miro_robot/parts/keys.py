@@ -6,13 +6,14 @@ from typing import TYPE_CHECKING, Any, ClassVar, NamedTuple
 
 import msgspec
 
-from miro_exact.rng import Stream
-
 if TYPE_CHECKING:
+    from miro_exact.rng import Stream
     from miro_robot.parts.part import Part
 
-IN, STRONG, OPEN_DRAIN = range(3)
-"""Kinds of pins: an input; drives both levels or lets go; pulls low or lets go."""
+IN, STRONG, OPEN_DRAIN, TWO_WAY = range(4)
+"""Kinds of pins: an input; an output that drives both levels, or lets go; pulls low or lets go, and is an input, too;
+drives both levels or lets go, and is an input, too: a data bus.
+"""
 LOW, HIGH, RELEASED = 0, 1, 2
 """What a part drives a pin with. A pin that was let go, of a driver that lets go, drives nothing."""
 MOST_PINS = 32
@@ -57,6 +58,11 @@ class PartKeys(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_only=
     @property
     def name(self) -> str:
         return str(self.__struct_config__.tag)
+
+    @property
+    def pulled_up(self) -> tuple[str, ...]:
+        """Pins that the part itself pulls up by a resistor: then nobody else need drive them high."""
+        return ()
 
     def make(self, place: Place) -> Part:
         """The part of these keys, soldered to this place."""

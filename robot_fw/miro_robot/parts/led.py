@@ -22,6 +22,10 @@ class Led(PartKeys, frozen=True, kw_only=True, tag="led"):
 
     active: Literal["low", "high"] = "low"
 
+    @property
+    def pulled_up(self) -> tuple[str, ...]:
+        return ("pin",) if self.active == "low" else ()
+
     def make(self, place: Place) -> Part:
         return LedPart(self, place)
 

@@ -1,0 +1,14 @@
+"""The names of parts of a board: electronics, and those that move. None is imported before a board names it."""
+
+from miro_exact.plugins import Registry
+from miro_robot.parts import ELECTRONICS
+from miro_robot.parts.keys import PartKeys
+
+MOVING: dict[str, str] = {}
+"""Parts that move: name to the struct of its keys, in `miro_sim.plant`."""
+PARTS: Registry[PartKeys] = Registry(
+    word="part",
+    key="part",
+    base="miro_robot.parts.keys:PartKeys",
+    own={**ELECTRONICS, **MOVING},
+)
