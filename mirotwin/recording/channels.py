@@ -5,6 +5,9 @@ Every message carries its tick; a period's messages are closed by its `/period` 
 /period                  a control period of the whole world
 /net0/wire               the characters on the air of network 0
 /net0/actions            what was done to its robots and its radio
+/net0/puts               what a test put into the parts of its board
+/net0/values             the values of these parts, once a period
+/net0/fault              what the firmware of its board did that it must not do
 /net0/camera/image       the frames of its camera
 /net0/robot2/lm629       a channel of the robot in slot 2 of network 0
 """
@@ -20,7 +23,7 @@ from msgspec.structs import astuple
 from miro_exact.clock import nanoseconds
 from miro_host.eye.track import Sighting
 from miro_host.posture import Posture
-from miro_protocol.actions import Action, Power, RadioState, Reset
+from miro_protocol.actions import PUT_PATH, Action, Power, Put, PutValue, RadioState, Reset
 from miro_protocol.stream import MAX_TICK
 from miro_protocol.transmission import DIRECTIONS, Transmission, check_bad_stop
 from miro_sim.periods import Axis, Control, RobotPeriod
@@ -28,6 +31,9 @@ from miro_sim.periods import Axis, Control, RobotPeriod
 PERIOD = "/period"
 WIRE = "wire"
 ACTIONS = "actions"
+PUTS = "puts"
+VALUES = "values"
+FAULT = "fault"
 IMAGE = "camera/image"
 _TOPIC = re.compile(rf"/net([0-9]{{1,9}})(?:/robot([0-9]{{1,9}}))?/([a-z0-9_]+|{IMAGE})")
 
@@ -260,6 +266,23 @@ class ActionMessage(msgspec.Struct, frozen=True, gc=False):
     value: Annotated[int, Meta(ge=0, le=1)] = 1
 
 
+class PutMessage(msgspec.Struct, frozen=True, gc=False):
+    """`puts`: a value that a test put into a part of a board; `path` is PART.KEY."""
+
+    tick: int
+    slot: int
+    path: str
+    value: PutValue
+
+
+class ValuesMessage(msgspec.Struct, frozen=True, gc=False):
+    """`values`: the values of the parts of a board at `tick`, by PART.KEY."""
+
+    tick: int
+    slot: int
+    values: dict[str, PutValue]
+
+
 class PeriodMessage(msgspec.Struct, frozen=True, gc=False):
     """`/period`: a control period that is over, and the digest of all states up to its end."""
 
@@ -278,7 +301,7 @@ ROBOT_CHANNELS: dict[str, type[msgspec.Struct]] = {
     "lm629": Lm629Message,
     "pwm": PwmMessage,
     "samples": SampleMessage,
-    "fault": FaultMessage,
+    FAULT: FaultMessage,
 }
 
 
@@ -286,6 +309,9 @@ OTHER_CHANNELS: dict[str, type[msgspec.Struct]] = {
     PERIOD: PeriodMessage,
     WIRE: WireMessage,
     ACTIONS: ActionMessage,
+    PUTS: PutMessage,
+    VALUES: ValuesMessage,
+    FAULT: FaultMessage,
     IMAGE: ImageMessage,
 }
 
@@ -297,8 +323,10 @@ def message_type(topic: Topic) -> type[msgspec.Struct] | None:
     return OTHER_CHANNELS.get(topic.channel)
 
 
-def action_message(action: Action) -> ActionMessage:
+def action_message(action: Action) -> ActionMessage | PutMessage:
     """The message about an action."""
+    if isinstance(action, Put):
+        return PutMessage(action.tick, action.slot, action.path, action.value)
     if isinstance(action, RadioState):
         return ActionMessage(action.tick, -1, action.state)
     if isinstance(action, Reset):
@@ -315,6 +343,14 @@ def action(network: int, message: ActionMessage) -> Action:
     if message.what == "power":
         return Power(message.tick, network, message.slot, message.value)
     return RadioState(message.tick, network, message.what)
+
+
+def put(network: int, message: PutMessage) -> Put:
+    """The put of a message. Raises ValueError for a message that cannot be."""
+    found = Put(message.tick, network, message.slot, message.path, message.value)
+    if not 0 <= message.tick <= MAX_TICK or message.slot < 0 or not PUT_PATH.fullmatch(message.path):
+        raise ValueError(f"{found.text} at tick {message.tick}")
+    return found
 
 
 def transmission(network: int, message: WireMessage) -> Transmission:
@@ -368,26 +404,43 @@ def _axis(registers: RegistersMessage, duty: DutyMessage) -> Axis:
     return Axis(*(*values, *astuple(duty), tuple(map(astuple, commands))))
 
 
+Named = tuple[tuple[str, str], ...]
+"""The keys of a map in a message, each with the JSON type of its values."""
+
+
 @cache
-def schema_text(kind: type[msgspec.Struct], inner: tuple[str, ...] | None = None) -> bytes:
-    """The JSON schema of messages of a kind, as text; `inner`: names of the values that a law gives.
+def schema_text(kind: type[msgspec.Struct], inner: Named | None = None) -> bytes:
+    """The JSON schema of messages of a kind, as text; `inner`: what the map in it holds.
 
     Made once: it takes longer than some control periods, and many robots have the same channels.
     """
     return msgspec.json.encode(IMAGE_SCHEMA if kind is ImageMessage else _schema(kind, inner))
 
 
-def _schema(kind: type[msgspec.Struct], inner: tuple[str, ...] | None) -> dict[str, object]:
+def inner_of(message: msgspec.Struct) -> Named | None:
+    """The keys of the map in a message, of a kind that has one: those of a law, or of a board's parts."""
+    if isinstance(message, ControlMessage):
+        return tuple((name, "number") for name in message.inner)
+    if isinstance(message, ValuesMessage):
+        return tuple((name, _JSON_TYPES.get(type(value), "number")) for name, value in message.values.items())
+    return None
+
+
+_JSON_TYPES = {str: "string", bool: "boolean"}
+
+
+def _schema(kind: type[msgspec.Struct], inner: Named | None) -> dict[str, object]:
     """The schema with references resolved: viewers want one plain tree.
 
-    The keys of a map, `inner`, become properties, because viewers offer nothing else to choose from.
+    The keys of a map become properties, because viewers offer nothing else to choose from.
     """
     (tree,), parts = msgspec.json.schema_components([kind], ref_template="{name}")
     resolved: dict[str, object] = _resolved(tree, parts)
     if inner is not None:
-        names = {name: {"type": "number"} for name in inner}
+        names = {name: {"type": of} for name, of in inner}
         named = {"type": "object", "properties": names, "required": list(names)}
-        resolved["properties"] = {**resolved["properties"], "inner": named}  # type: ignore[dict-item]
+        place = "values" if kind is ValuesMessage else "inner"
+        resolved["properties"] = {**resolved["properties"], place: named}  # type: ignore[dict-item]
     return resolved
 
 

@@ -17,6 +17,7 @@ from mirotwin.recording.recorder import (
     METADATA,
     RESUMED_ATTACHMENT,
     SCENARIO_ATTACHMENT,
+    SERIAL,
     SYMBOLS_ATTACHMENT,
 )
 
@@ -28,7 +29,8 @@ class Messages:
     """Iterates over (topic, message) of those of `kinds` (default: all). Raises RecordingError where it cannot go on.
 
     `read` and `path` as in `Records`. `metadata` (None: not a recording of this program) and `attachments` stand at the
-    beginning of a file and are there with the first message. `broken_off`: what to say of a run that was.
+    beginning of a file and are there with the first message; `serial`, about the line of a board, comes later, or not
+    at all. `broken_off`: what to say of a run that was.
     """
 
     def __init__(
@@ -38,6 +40,7 @@ class Messages:
         self.kinds = kinds
         self.offset = 0
         self.metadata: dict[str, str] | None = None
+        self.serial: dict[str, str] = {}
         self.attachments: dict[str, bytes] = {}
         self.broken_off = ""
         self._topic = ""
@@ -76,6 +79,8 @@ class Messages:
             self.broken_off = f"{self.path}: the run that wrote it was broken off"
             if record.metadata.get("reason"):
                 self.broken_off += f": {one_line(shortened(record.metadata['reason']))}"
+        elif record.name == SERIAL:
+            self.serial = record.metadata
         elif record.name == METADATA:
             self.metadata = record.metadata
             recorded_format = record.metadata.get("format")

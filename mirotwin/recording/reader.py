@@ -5,17 +5,18 @@ periods are returned.
 """
 
 import re
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from io import BytesIO
 from pathlib import Path
 from typing import Any
 
 import msgspec
 
+from miro_exact.clock import TICKS_PER_SECOND
 from miro_exact.inputs import RECORDING_BYTES, read_input
 from miro_protocol.actions import Action
 from miro_protocol.transmission import Transmission
-from miro_sim.periods import Period
+from miro_sim.periods import PartValues, Period
 from mirotwin.recording import channels
 from mirotwin.recording.channels import OTHER_CHANNELS, ROBOT_CHANNELS, ImageMessage, TheoryMessage, Topic
 from mirotwin.recording.container import Cut, RecordingError
@@ -86,6 +87,7 @@ class _Collector:
         self.robots: dict[tuple[int, int], dict[str, Any]] = {}
         self.wire: list[Transmission] = []
         self.actions: list[Action] = []
+        self.values: list[PartValues] = []
         self.periods: list[Period] = []
 
     def take(self, topic: Topic, message: Any) -> None:
@@ -96,6 +98,11 @@ class _Collector:
             self.wire.append(channels.transmission(topic.network, message))
         elif isinstance(message, channels.ActionMessage):
             self.actions.append(channels.action(topic.network, message))
+        elif isinstance(message, channels.PutMessage):
+            self.actions.append(channels.put(topic.network, message))
+        elif isinstance(message, channels.ValuesMessage):
+            values = PartValues(topic.network, message.slot, message.tick, message.values)
+            self.values.append(values)
         elif topic.channel not in ("samples", "fault"):
             self.robots.setdefault((topic.network, topic.slot), {})[topic.channel] = message
 
@@ -107,13 +114,13 @@ class _Collector:
         robots = tuple(
             channels.robot_period(network, slot, found) for (network, slot), found in self.robots.items()
         )
-        period = Period(
-            message.index, message.tick, robots, tuple(self.wire), message.digest, tuple(self.actions)
-        )
+        taken = tuple(self.wire), message.digest, tuple(self.actions), tuple(self.values)
+        period = Period(message.index, message.tick, robots, *taken)
         self.periods.append(period)
         self.robots = {}
         self.wire = []
         self.actions = []
+        self.values = []
 
 
 def _source(messages: Messages) -> RunSource:
@@ -143,4 +150,13 @@ def _source(messages: Messages) -> RunSource:
         resumed=attachments.get(RESUMED_ATTACHMENT, b""),
         origin=metadata.get("source", ""),
         plugins=tuple(metadata.get("plugins", "").splitlines()),
+        crystal_hz=_number(messages, metadata, "crystal_hz", TICKS_PER_SECOND),
+        bit_ticks=_number(messages, messages.serial, "bit_ticks", 0),
     )
+
+
+def _number(messages: Messages, table: Mapping[str, str], key: str, default: int) -> int:
+    text = table.get(key, f"{default}")
+    if not re.fullmatch(r"[0-9]{1,10}", text):
+        raise messages.error(f"{key} {text!r} is not a number", AGAIN)
+    return int(text)

@@ -15,17 +15,18 @@ from typing import TYPE_CHECKING, Any, BinaryIO
 import msgspec
 
 from miro_exact.bad_input import BadInput
+from miro_exact.clock import TICKS_PER_SECOND
 from miro_exact.installed import described_once
 from miro_sim.periods import Period
 from miro_sim.scenario.file import ScenarioText
 from miro_sim.scenario.plugins import plugins_used
 from mirotwin.recording import channels
-from mirotwin.recording.channels import ControlMessage, FaultMessage, ImageMessage, TheoryMessage
+from mirotwin.recording.channels import FaultMessage, ImageMessage, TheoryMessage
 from mirotwin.recording.rows import Message, MessageWriter
 from mirotwin.recording.writer import McapWriter
 
 if TYPE_CHECKING:
-    from miro_sim.world.robot import Robot
+    from miro_sim.world.device import Device
     from miro_sim.world.world import World
 
 METADATA = "mirotwin"
@@ -40,6 +41,8 @@ FLUSH_S = 0.2
 """Wall time between two flushes, which comes to half a second on a busy machine too."""
 TOGETHER = 40
 """Control periods that are written one after the other: after a simulated one the caches hold nothing of this."""
+SERIAL = "mirotwin.serial"
+"""Name of the metadata about the serial line of a board. `bit_ticks`: length of the bits that its host sent."""
 BROKEN_OFF = "mirotwin.broken_off"
 """Name of the metadata in a recording whose run did not come to its end. `reason`: which part of which robot failed,
 and when, if that is why."""
@@ -50,7 +53,8 @@ class RunSource(msgspec.Struct, frozen=True):
     space). `state`: the form of the states that its digests are of (`Flat.tables`), "" where it is not known.
     `resumed`: the saved world that the run went on from, empty for a run from its start. `origin`: "port" where robots
     were real and what is in it is their twin's, else empty. `plugins`: those of other distributions that the scenario
-    names, with version and hash of their sources (`miro_exact.installed.described`).
+    names, with version and hash of their sources (`miro_exact.installed.described`). `crystal_hz`: ticks per second.
+    `bit_ticks`: length of the bits that the host of a board sent, 0 where it sent none.
     """
 
     scenario_name: str
@@ -64,6 +68,8 @@ class RunSource(msgspec.Struct, frozen=True):
     resumed: bytes = b""
     origin: str = ""
     plugins: tuple[str, ...] = ()
+    crystal_hz: int = TICKS_PER_SECOND
+    bit_ticks: int = 0
 
 
 def source_of(text: ScenarioText, world: World, record: str = "default", resumed: bytes = b"") -> RunSource:
@@ -80,6 +86,7 @@ def source_of(text: ScenarioText, world: World, record: str = "default", resumed
         state=world.state.tables(),
         resumed=resumed,
         plugins=plugins_used(text.scenario, described_once),
+        crystal_hz=world.clock,
     )
 
 
@@ -99,7 +106,7 @@ class Recorder:
         self._waiting: list[Period | Message] = []
         self._flushed_s = -FLUSH_S  # never
         self._writer = McapWriter(stream, profile=METADATA, library=METADATA)
-        self._rows = MessageWriter(self._writer.chunk, self._add_channel)
+        self._rows = MessageWriter(self._writer.chunk, self._add_channel, source.crystal_hz)
         self._writer.add_metadata(
             METADATA,
             {
@@ -111,6 +118,7 @@ class Recorder:
                 **({"state": source.state} if source.state else {}),
                 **({"source": source.origin} if source.origin else {}),
                 **({"plugins": "\n".join(source.plugins)} if source.plugins else {}),
+                **({"crystal_hz": f"{source.crystal_hz}"} if source.crystal_hz != TICKS_PER_SECOND else {}),
             },
         )
         self._writer.add_attachment(SCENARIO_ATTACHMENT, "application/toml", source.scenario_text.encode())
@@ -174,12 +182,19 @@ class Recorder:
         for network, slot, message in theories:
             self.add("theory", network, slot, message)
 
-    def write_faults(self, robots: Iterable[Robot]) -> None:
-        """Adds what the firmware of these robots did that it must not do."""
-        for robot in robots:
-            for fault in robot.board.faults:
+    def write_faults(self, devices: Iterable[Device], alone: bool = False) -> None:
+        """Adds what the firmware of these devices did that it must not do; `alone`: of a board on a wire."""
+        for device in devices:
+            for fault in device.board.faults:
                 values = fault.tick, int(fault.kind), fault.pc, fault.symbol, str(fault)
-                self.add("fault", robot.network, robot.slot, FaultMessage(*values))
+                slot = -1 if alone else device.slot
+                self.add(channels.FAULT, device.network, slot, FaultMessage(*values))
+
+    def write_bit_ticks(self, bit_ticks: int) -> None:
+        """Notes the length of the bits that the host of a board sends, as soon as it is known."""
+        with self._undisturbed:
+            self._write_waiting()
+            self._writer.add_metadata(SERIAL, {"bit_ticks": f"{bit_ticks}"})
 
     def write_image(self, network: int, tick: int, png: bytes) -> None:
         """Adds the frame of a network's camera that was exposed at `tick`, after all that was added before."""
@@ -189,8 +204,7 @@ class Recorder:
     def _add_channel(self, topic: str, message: msgspec.Struct) -> int:
         """A channel for messages like this one. A second law's inner values make the schema `mirotwin.Control2`."""
         kind = type(message)
-        inner = tuple(message.inner) if isinstance(message, ControlMessage) else None
-        text = channels.schema_text(kind, inner)
+        text = channels.schema_text(kind, channels.inner_of(message))
         if text not in self._schemas:
             name = channels.schema_name(kind)
             number = self._named[name] = self._named.get(name, 0) + 1

@@ -27,6 +27,7 @@ cdef class MessageWriter:
     cdef Chunk chunk
     cdef object add_channel
     cdef readonly dict channels
+    cdef tuple ns_ticks
 
     cpdef write_all(self, list waiting)
     cdef _period(self, period)

@@ -7,15 +7,20 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from functools import cache
+from math import gcd
 
 import msgspec
 from msgspec.structs import astuple
 
+from miro_exact.clock import NS_PER_SECOND, TICKS_PER_SECOND
 from miro_host.eye.track import Sighting
+from miro_protocol.actions import Put
 from miro_sim.periods import Axis, Period, RobotPeriod
 from mirotwin.recording.channels import (
     ACTIONS,
     PERIOD,
+    PUTS,
+    VALUES,
     WIRE,
     CommandMessage,
     ControlMessage,
@@ -28,6 +33,7 @@ from mirotwin.recording.channels import (
     PwmMessage,
     RegistersMessage,
     TruthMessage,
+    ValuesMessage,
     WireMessage,
     action_message,
     topic_name,
@@ -119,33 +125,46 @@ def _put(out: bytearray, place: int, value: int) -> None:
 class MessageWriter:
     """Writes messages into a chunk.
 
-    `add_channel` makes a channel of a topic, from its first message and the names of a law's inner values.
+    `add_channel` makes a channel of a topic from its first message. `crystal_hz`: ticks per second.
     """
 
-    def __init__(self, chunk: Chunk, add_channel: Callable[[str, msgspec.Struct], int]) -> None:
+    def __init__(
+        self,
+        chunk: Chunk,
+        add_channel: Callable[[str, msgspec.Struct], int],
+        crystal_hz: int = TICKS_PER_SECOND,
+    ) -> None:
         self.chunk = chunk
         self.add_channel = add_channel
+        common = gcd(NS_PER_SECOND, crystal_hz)
+        self.ns_ticks = NS_PER_SECOND // common, crystal_hz // common  # so many nanoseconds are so many ticks
         self.channels: dict[str, int] = {}  # by topic
 
     def write_all(self, waiting: list[Period | Message]) -> None:
         """Writes periods and single messages, in turn."""
+        ns, ticks = self.ns_ticks
         for item in waiting:
             if isinstance(item, tuple):
                 topic, tick, message = item
-                self._add(topic, tick * 125 // 3, message)  # `nanoseconds`
+                self._add(topic, tick * ns // ticks, message)  # `nanoseconds`
             else:
                 self._period(item)
 
     def _period(self, period: Period) -> None:
+        ns, ticks = self.ns_ticks
         tick = period.tick
-        time_ns = tick * 125 // 3
+        time_ns = tick * ns // ticks
         for robot in period.robots:
             self._robot(robot, tick, time_ns)
         for sent in period.wire:
             message = WireMessage(sent.tick, sent.direction, sent.data.hex(), sent.bad_stop)
-            self._add(_topic(WIRE, sent.network), sent.tick * 125 // 3, message)
+            self._add(_topic(WIRE, sent.network), sent.tick * ns // ticks, message)
         for action in period.actions:
-            self._add(_topic(ACTIONS, action.network), action.tick * 125 // 3, action_message(action))
+            channel = PUTS if isinstance(action, Put) else ACTIONS
+            self._add(_topic(channel, action.network), action.tick * ns // ticks, action_message(action))
+        for parts in period.values:
+            values = ValuesMessage(parts.tick, parts.slot, parts.values)
+            self._add(_topic(VALUES, parts.network), parts.tick * ns // ticks, values)
         self._add(PERIOD, time_ns, PeriodMessage(tick, period.index, period.digest))
 
     def _robot(self, robot: RobotPeriod, tick: int, time_ns: int) -> None:

@@ -45,9 +45,15 @@ def observed(
     recording up to then is worth having.
     """
 
+    bit_ticks = 0
+
     def keep(period: Period) -> None:
+        nonlocal bit_ticks
         if recorder is not None:
             recorder.write(period)
+            if bit_ticks != world.bit_ticks:
+                bit_ticks = world.bit_ticks
+                recorder.write_bit_ticks(bit_ticks)
         on_period(period)
 
     world.observers.append(keep)
@@ -56,7 +62,7 @@ def observed(
     finally:
         world.observers.remove(keep)
         if recorder is not None:
-            recorder.write_faults(world.robots)
+            recorder.write_faults(world.devices, alone=not world.robots)
 
 
 def _run_samples(world: World, recorder: Recorder) -> None:

@@ -1,12 +1,23 @@
-"""What is done to robots, radios and pins at a tick; a script has transmissions and these."""
+"""What is done to robots, radios, pins and parts at a tick; a script has transmissions and these."""
 
 from __future__ import annotations
 
+import json
+import math
+import re
 from typing import Literal
 
 import msgspec
 
+from miro_protocol.toml_text import TomlError, tables
 from miro_protocol.transmission import Transmission
+
+PutValue = float | int | str | bool
+PUT_PATH = re.compile(r"[A-Za-z0-9_-]{1,64}(?:\.[A-Za-z0-9_-]{1,64}){1,7}", re.ASCII)
+"""`PART.KEY`; a key may have dots itself."""
+PUT_BYTES = 4096
+"""Longest text of a put."""
+_HOW_TO_PUT = 'write PART.KEY = VALUE, such as eyes.distance_cm = 60 or eyes.echo = "none"'
 
 
 class Reset(msgspec.Struct, frozen=True):
@@ -43,8 +54,59 @@ class PinLevel(msgspec.Struct, frozen=True):
     level: int
 
 
-Action = Reset | Power | RadioState
-"""What somebody does to a robot or a radio in a world."""
+class Put(msgspec.Struct, frozen=True):
+    """`TICK * eyes.distance_cm = 60`: a test puts a value of a part of a board; `path` is PART.KEY."""
+
+    tick: int
+    network: int
+    slot: int
+    path: str
+    value: PutValue
+
+    @property
+    def text(self) -> str:
+        """`PATH = VALUE`, as TOML in one line without #. Raises ValueError for what cannot be read back."""
+        return f"{self.path} = {_written(self.value)}"
+
+
+def put_of(tick: int, network: int, slot: int, text: str) -> Put:
+    """The put that this text says. Raises ValueError: reason; remedy."""
+    path, equals, value = (part.strip() for part in text.partition("="))
+    if not equals or not PUT_PATH.fullmatch(path):
+        raise ValueError(f"{text[:40]!r} is not PART.KEY = VALUE; {_HOW_TO_PUT}")
+    try:
+        found = tables(f"value = {value}")
+    except TomlError:
+        found = {}
+    if list(found) != ["value"] or not isinstance(found["value"], PutValue):
+        raise ValueError(f"{value[:40]!r} is no number, text or boolean; {_HOW_TO_PUT}")
+    put = Put(tick, network, slot, path, found["value"])
+    put.text  # noqa: B018 - raises for a number that cannot be used
+    return put
+
+
+def _written(value: PutValue) -> str:
+    if isinstance(value, bool):
+        return str(value).lower()
+    if isinstance(value, str):
+        text = json.dumps(value, ensure_ascii=False).replace("\x7f", "\\u007f")
+        text = text.replace("#", "\\u0023")  # which begins a comment in a stream file
+        if any("\ud800" <= char <= "\udfff" for char in value):
+            raise ValueError("a text with half a character cannot be put; give text in UTF-8")
+        if len(text.encode()) > PUT_BYTES // 2:
+            raise ValueError(
+                f"a text of {len(value)} characters cannot be put; give {PUT_BYTES // 16} at most"
+            )
+        return text
+    if isinstance(value, float) and not math.isfinite(value):
+        raise ValueError(f"{value} cannot be put; give a finite number")
+    if isinstance(value, int) and value.bit_length() > 63:
+        raise ValueError(f"an integer of {value.bit_length()} bits cannot be put; give one of 63 at most")
+    return repr(value)
+
+
+Action = Reset | Power | RadioState | Put
+"""What somebody does to a robot, a radio or a part in a world."""
 ScriptItem = Transmission | Action
 """What goes into a world from outside."""
 
@@ -52,6 +114,7 @@ WHO_CAN = {
     Reset: "`mirotwin replay` resets robots",
     Power: "`mirotwin replay` switches robots off and on",
     RadioState: "`mirotwin replay` switches radios off and on",
+    Put: "`mirotwin replay` puts values of the parts of a board",
     PinLevel: "`mirotwin fw run --pins FILE` puts levels on the pins of a bare processor",
 }
 """For a reader that cannot do an action: who can."""

@@ -11,7 +11,7 @@ line; two lines may have the same one. What belongs here: whole files. What does
 (`stream_line.py`) and of the header (`stream_header.py`), and judging the bytes; any bytes may be recorded.
 
 A file is written as version 1 if that has words for everything in it: no header, no action, one network and no bad stop
-bit. What is written is read back as the same.
+bit; as version 3 if it puts values of parts, or is for a board. What is written is read back as the same.
 """
 
 from __future__ import annotations
@@ -32,7 +32,7 @@ from miro_protocol.stream_line import (
     StreamItem,
     StreamLine,
     format_line,
-    needs_version_2,
+    version_of,
 )
 from miro_protocol.stream_line import StreamError as StreamError
 from miro_protocol.transmission import Transmission
@@ -142,7 +142,7 @@ def decode(data: bytes, source: str = "<stream>") -> StreamFile:
 def format_stream(lines: Iterable[Entry | StreamItem], header: Header | None = None) -> str:
     """The whole file. ValueError for what could not be read back, and when ticks go backwards."""
     written, last = [], 0
-    version = 1 if header is None or not header.text else 2
+    version = 1 if header is None or not header.text else header.needed_version
     for one in lines:
         entry = one if isinstance(one, Entry) else Entry(one)
         written.append(format_line(entry.what, entry.comment))
@@ -151,7 +151,7 @@ def format_stream(lines: Iterable[Entry | StreamItem], header: Header | None = N
                 f"tick = {entry.what.tick}: must not be before {last}, the one of the line above"
             )
         last = entry.what.tick
-        version = max(version, 1 + needs_version_2(entry.what))
+        version = max(version, version_of(entry.what))
     head = [FIRST_LINE.format(version), *stream_header.lines(header or Header())]
     return "".join(f"{line}\n" for line in (*head, *written))
 

@@ -29,7 +29,8 @@ class Header(msgspec.Struct, frozen=True, kw_only=True):
     `scenario`: the name of a built-in scenario, or a whole one. `set`: changes to the scenario, by the path of a key.
     `expect`: checks, as in a scenario. `verdict`: what the one of them said that failed, `end_tick`: where that run
     ended; with them the file is a case. `bare`: clock and bit length where it is for a bare processor and not for the
-    robot. `version`: of the program that wrote the file.
+    robot. `board`: the file, the name or the table of the board that it is for; `crystal_hz`: ticks per second, default
+    24,000,000. `version`: of the program that wrote the file.
     """
 
     text: str = ""
@@ -41,7 +42,14 @@ class Header(msgspec.Struct, frozen=True, kw_only=True):
     verdict: str | None = None
     end_tick: Annotated[int, Meta(ge=1, le=(1 << 61) - 1)] | None = None
     bare: dict[str, Any] | None = None
+    board: str | dict[str, Any] | None = None
+    crystal_hz: Annotated[int, Meta(ge=1, le=10**9)] | None = None
     version: str | None = None
+
+    @property
+    def needed_version(self) -> int:
+        """The first version of a stream file whose header may have these keys."""
+        return 2 if self.board is None and self.crystal_hz is None else 3
 
 
 KEYS = {field.name: field.type for field in msgspec.structs.fields(Header) if field.name != "text"}
@@ -117,6 +125,8 @@ _REMEDIES = {
     "expect": "give a table: checks and what they expect",
     "verdict": "give the line of the check that failed as text",
     "bare": "give a table: crystal_hz, bit_ticks, begin_tick",
+    "board": "give the path of a board file, the name of a built-in board, or a whole one as a table",
+    "crystal_hz": "give a whole number of hertz",
     "end_tick": f"give a whole number 1..{(1 << 61) - 1}",
     "version": "give the version as text",
 }

@@ -6,8 +6,9 @@
     800000 *@1/2 power 0
     800000 *@1 radio down
     800000 * P1.0 0
+    800000 * eyes.distance_cm = 60
 
-Version 1 has characters of network 0 with good stop bits, and nothing else.
+Version 1 has characters of network 0 with good stop bits, and nothing else; version 2 does not put values of parts.
 """
 
 from __future__ import annotations
@@ -17,7 +18,17 @@ from dataclasses import dataclass, field
 from reprlib import repr as brief
 
 from miro_exact.bad_input import BadInput
-from miro_protocol.actions import Action, PinLevel, Power, RadioState, Reset, ScriptItem
+from miro_protocol.actions import (
+    PUT_PATH,
+    Action,
+    PinLevel,
+    Power,
+    Put,
+    RadioState,
+    Reset,
+    ScriptItem,
+    put_of,
+)
 from miro_protocol.table import ROBOT_COUNTS
 from miro_protocol.transmission import DIRECTIONS, DOWN, UP, Transmission, check_bad_stop
 
@@ -34,7 +45,7 @@ MAX_NETWORK = 0xFFFF
 MAX_SLOT = max(ROBOT_COUNTS) - 1
 HAND = "*"
 FIRST_LINE = "# mirotwin stream {}"
-VERSIONS = (1, 2)
+VERSIONS = (1, 2, 3)
 RADIO_STATES = ("up", "down", "noise")
 
 _VERSION = re.compile(r"#\s*mirotwin stream\b\s*+(.*)")
@@ -43,7 +54,10 @@ _TICK = re.compile(r"[0-9]{1,19}")
 _CHARACTER = re.compile(r"([0-9a-fA-F]{2})(!?)")
 _PLACE = re.compile(r"([<>*])(?:@([0-9]{1,5})(?:/([0-9]{1,5}))?)?")
 _PIN = re.compile(r"P[0-3]\.[0-7]")
-_ACTIONS = "write `*@N/SLOT reset 0|1`, `*@N/SLOT power 0|1`, `*@N radio up|down|noise` or `* P1.0 0|1`"
+_ACTIONS = (
+    "write `*@N/SLOT reset 0|1`, `*@N/SLOT power 0|1`, `*@N radio up|down|noise`, `* P1.0 0|1`"
+    " or `* PART.KEY = VALUE`"
+)
 
 StreamItem = ScriptItem | PinLevel
 
@@ -57,9 +71,11 @@ class Entry:
     line: int = field(default=0, compare=False)
 
 
-def needs_version_2(what: StreamItem) -> bool:
-    """Whether version 1 has no words for it."""
-    return not isinstance(what, Transmission) or bool(what.network or what.bad_stop)
+def version_of(what: StreamItem) -> int:
+    """The first version that has words for it."""
+    if isinstance(what, Put):
+        return 3
+    return 2 if not isinstance(what, Transmission) or what.network or what.bad_stop else 1
 
 
 def format_line(what: StreamItem, comment: str = "") -> str:
@@ -94,6 +110,12 @@ def _action(action: Action | PinLevel) -> str:
         _check("level", action.level, 1)
         return f"{HAND} {action.pin} {action.level}"
     _check("network", action.network, MAX_NETWORK)
+    if isinstance(action, Put):
+        _check("slot", action.slot, MAX_SLOT)
+        if not PUT_PATH.fullmatch(action.path):
+            raise ValueError(f"path = {action.path!r}: must be PART.KEY")
+        place = f"@{action.network}/{action.slot}" if action.network or action.slot else ""
+        return f"{HAND}{place} {action.text}"
     if isinstance(action, Reset | Power):
         word, value = ("reset", action.level) if isinstance(action, Reset) else ("power", action.on)
         _check("slot", action.slot, MAX_SLOT)
@@ -134,7 +156,7 @@ class StreamLine:
         version = found[1].rstrip()
         if version not in map(str, VERSIONS):
             reason = f"stream version {brief(version or 'missing')}"
-            remedy = "this program reads versions 1 and 2; use the one that wrote it"
+            remedy = "this program reads versions 1 to 3; use the one that wrote it"
             raise self.error(found.start(1) + 1, reason, remedy)
         return int(version)
 
@@ -145,7 +167,7 @@ class StreamLine:
         tick = self._tick(self.tokens[0])
         kind, network, slot = self._place(version)
         if kind == HAND:
-            what: StreamItem = self._read_action(tick, network, slot)
+            what: StreamItem = self._read_action(tick, network, slot, version)
         else:
             what = self._read_characters(tick, kind, network or 0, version)
         return Entry(what, self.comment, self.number)
@@ -166,7 +188,7 @@ class StreamLine:
         if found is None or (found[3] is not None and found[1] != HAND):
             raise self.error(token, f"{brief(token[0])} is not a direction", remedy)
         if version == 1 and token[0] not in DIRECTIONS:
-            raise self._too_new(token)
+            raise self._too_new(token, version, 2)
         network = self._number(token, found[2], "network", MAX_NETWORK)
         return found[1], network, self._number(token, found[3], "slot", MAX_SLOT)
 
@@ -175,9 +197,9 @@ class StreamLine:
             raise self.error(token, f"{name} {digits}", f"there are {name}s 0..{high}")
         return None if digits is None else int(digits)
 
-    def _too_new(self, token: re.Match[str]) -> StreamError:
-        reason = f"{brief(token[0])} is not known in stream version 1"
-        return self.error(token, reason, f"begin the file with `{FIRST_LINE.format(2)}`")
+    def _too_new(self, token: re.Match[str], version: int, needed: int) -> StreamError:
+        reason = f"{brief(token[0])} is not known in stream version {version}"
+        return self.error(token, reason, f"begin the file with `{FIRST_LINE.format(needed)}`")
 
     def _read_characters(self, tick: int, direction: str, network: int, version: int) -> Transmission:
         if len(self.tokens) == 2:
@@ -190,12 +212,16 @@ class StreamLine:
                 raise self.error(token, reason, "write two hex digits each, with blanks between")
             if found[2]:
                 if version == 1:
-                    raise self._too_new(token)
+                    raise self._too_new(token, version, 2)
                 bad_stop.append(len(data))
             data.append(int(found[1], 16))
         return Transmission(tick, direction, bytes(data), network, tuple(bad_stop))
 
-    def _read_action(self, tick: int, network: int | None, slot: int | None) -> Action | PinLevel:
+    def _read_action(
+        self, tick: int, network: int | None, slot: int | None, version: int
+    ) -> Action | PinLevel:
+        if "=" in self.text[: self.end - 1]:
+            return self._read_put(tick, network, slot, version)
         if len(self.tokens) != 4:
             raise self.error(self.end, "not an action", _ACTIONS)
         place, word, value = self.tokens[1], self.tokens[2][0], self.tokens[3][0]
@@ -207,3 +233,15 @@ class StreamLine:
             return PinLevel(tick, word, int(value))
         said = brief(self.text[place.start() : self.end - 1])
         raise self.error(place, f"{said} is not an action", _ACTIONS)
+
+    def _read_put(self, tick: int, network: int | None, slot: int | None, version: int) -> Put:
+        if len(self.tokens) == 2:
+            raise self.error(self.end, "not an action", _ACTIONS)
+        token = self.tokens[2]
+        if version < 3:
+            raise self._too_new(token, version, 3)
+        try:
+            return put_of(tick, network or 0, slot or 0, self.text[token.start() : self.end - 1])
+        except ValueError as error:
+            reason, _, remedy = f"{error}".partition("; ")
+            raise self.error(token, reason, remedy) from None

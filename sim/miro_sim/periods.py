@@ -75,10 +75,20 @@ class RobotPeriod(msgspec.Struct, frozen=True, gc=False):
     right: Axis
 
 
+class PartValues(msgspec.Struct, frozen=True, gc=False):
+    """The values of the parts of a board at `tick`, by path (`eyes.distance_cm`)."""
+
+    network: int
+    slot: int
+    tick: int
+    values: dict[str, float | int | bool | str]
+
+
 class Period(msgspec.Struct, frozen=True, gc=False):
     """Control period `index`, which begins at `tick`; `digest` (hex) chains the states up to its end.
 
-    `actions`: what was done to robots and radios meanwhile, as a script or a caller wanted it.
+    `actions`: what was done to robots, radios and parts meanwhile, as a script or a caller wanted it. `values`: of
+    boards with parts, at its end.
     """
 
     index: int
@@ -87,3 +97,4 @@ class Period(msgspec.Struct, frozen=True, gc=False):
     wire: tuple[Transmission, ...]
     digest: str
     actions: tuple[Action, ...] = ()
+    values: tuple[PartValues, ...] = ()

@@ -5,7 +5,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from miro_protocol import stream, stream_header, stream_line
-from miro_protocol.actions import PinLevel, Power, RadioState, Reset
+from miro_protocol.actions import PinLevel, Power, Put, RadioState, Reset
 from miro_protocol.stream import Entry, StreamError
 from miro_protocol.transmission import DIRECTIONS, Transmission
 
@@ -24,11 +24,20 @@ def flawed(draw):
 
 
 slots, levels = st.integers(0, stream_line.MAX_SLOT), st.integers(0, 1)
+put_values = st.one_of(
+    st.floats(allow_nan=False, allow_infinity=False),
+    st.integers(-(1 << 62), 1 << 62),
+    st.booleans(),
+    st.text(max_size=50),
+)
 events = st.one_of(
     st.builds(Reset, ticks, networks, slots, levels),
     st.builds(Power, ticks, networks, slots, levels),
     st.builds(RadioState, ticks, networks, st.sampled_from(stream_line.RADIO_STATES)),
     st.builds(PinLevel, ticks, st.from_regex(r"\AP[0-3]\.[0-7]\Z"), levels),
+    st.builds(
+        Put, ticks, networks, slots, st.from_regex(r"\A[a-z]{1,5}(\.[a-z0-9_]{1,9}){1,3}\Z"), put_values
+    ),
 )
 
 
@@ -79,6 +88,12 @@ def test_what_is_new_makes_a_file_of_version_2(new):
     assert stream.format_stream([new]).startswith("# mirotwin stream 2\n")
 
 
+def test_a_put_or_the_header_of_a_board_makes_a_file_of_version_3():
+    assert stream.format_stream([Put(5, 0, 0, "eyes.distance_cm", 60)]).startswith("# mirotwin stream 3\n")
+    header = stream_header.of_text('board = "car.board.toml"\ncrystal_hz = 11059200')
+    assert stream.format_stream([], header).startswith("# mirotwin stream 3\n")
+
+
 def test_lines_look_as_the_protocol_page_shows_them():
     line = stream.format_line(Transmission(792000, ">", b"\x55\xff\x2d\xd4"), "team seq=3")
     assert line == "792000 > 55 ff 2d d4  # team seq=3"
@@ -87,6 +102,8 @@ def test_lines_look_as_the_protocol_page_shows_them():
     assert stream.format_line(Power(5, 0, 2, 0)) == "5 *@0/2 power 0"
     assert stream.format_line(RadioState(5, 1, "noise")) == "5 *@1 radio noise"
     assert stream.format_line(PinLevel(5, "P3.2", 0)) == "5 * P3.2 0"
+    assert stream.format_line(Put(5, 0, 0, "eyes.distance_cm", 60)) == "5 * eyes.distance_cm = 60"
+    assert stream.format_line(Put(5, 1, 2, "eyes.echo", "no #")) == '5 *@1/2 eyes.echo = "no \\u0023"'
 
 
 def test_blank_lines_comments_capitals_and_windows_line_ends_are_read():
@@ -106,6 +123,7 @@ def test_comments_may_stand_between_the_lines_of_a_header():
 
 
 V2 = "# mirotwin stream 2\n"
+V3 = "# mirotwin stream 3\n"
 REFUSED = [
     ("x > 55", 1, 1, "'x' is not a tick", "0..2305843009213693951"),
     ("-1 > 55", 1, 1, "'-1' is not a tick", ""),
@@ -117,7 +135,7 @@ REFUSED = [
     ("5 > 55 0x55", 1, 8, "'0x55' is not a character", ""),
     ("5 > 55 ٣٣", 1, 8, "is not a character", ""),
     ("9 > 55\n\n 8 > 55", 3, 2, "tick 8 goes backwards", "the line before has 9"),
-    ("# mirotwin stream 3\n", 1, 19, "stream version '3'", "reads versions 1 and 2"),
+    ("# mirotwin stream 4\n", 1, 19, "stream version '4'", "reads versions 1 to 3"),
     ("# mirotwin stream\n", 1, 18, "stream version 'missing'", ""),
     ("5 > 55 aa!", 1, 8, "'aa!' is not known in stream version 1", "`# mirotwin stream 2`"),
     ("5 >@1 55", 1, 3, "'>@1' is not known in stream version 1", ""),
@@ -134,6 +152,15 @@ REFUSED = [
     (V2 + "5 * P1.8 1", 2, 3, "is not an action", ""),
     (V2 + "5 * P1.0 1 1", 2, 13, "not an action", ""),
     (V2 + "5 *  # P1.0", 2, 4, "not an action", ""),
+    (V2 + "5 * eyes.distance_cm = 60", 2, 5, "is not known in stream version 2", "`# mirotwin stream 3`"),
+    (V3 + "5 * eyes = 60", 2, 5, "'eyes = 60' is not PART.KEY = VALUE", "eyes.distance_cm = 60"),
+    (V3 + "5 * eyes.echo = none", 2, 5, "'none' is no number, text or boolean", 'eyes.echo = "none"'),
+    (V3 + "5 * eyes.echo = [1]", 2, 5, "'[1]' is no number", ""),
+    (V3 + "5 * eyes.distance_cm = nan", 2, 5, "nan cannot be put", "a finite number"),
+    (V3 + "5 * eyes.distance_cm = 9" + "9" * 30, 2, 5, "an integer of 103 bits", "63 at most"),
+    (V3 + "5 * eyes.echo = 'a#b'", 2, 5, "is no number, text", ""),
+    (V3 + "#: board = 5", 2, 4, "board: Expected", "the path of a board file"),
+    (V3 + "#: crystal_hz = 0", 2, 4, "crystal_hz: Expected", "hertz"),
     (V2 + "9 > 55\n8 * P1.0 0", 3, 1, "tick 8 goes backwards", ""),
     (V2 + "5 > 55\n#: seed = 1", 3, 1, "a line of the header after the first tick", "above all ticks"),
     (
@@ -171,12 +198,12 @@ def test_a_wrong_line_is_named_with_place_reason_and_remedy(text, line, column, 
 
 PIECES = ["5 ", "7 ", "> ", "<@1 ", "*@0/1 ", "* ", "55 ", "aa! ", "reset ", "radio ", "up ", "P1.0 ", "1 "]
 PIECES += ["\n", "#: ", "# ", "seed = 1\n", "[set]\n", "scenario = ", "'fig6'", "@", "\r\n", "!", "\x85"]
-PIECES.append("9" * 30)
+PIECES += ["9" * 30, "eyes.d ", "= ", "6.5", '"a"', "true"]
 texts = st.one_of(st.text(), st.lists(st.sampled_from(PIECES), max_size=30).map("".join))
 
 
 @settings(max_examples=300)
-@given(st.sampled_from(["", "# mirotwin stream 1\n", V2]), texts)
+@given(st.sampled_from(["", "# mirotwin stream 1\n", V2, V3]), texts)
 def test_any_text_at_all_is_a_stream_or_a_stream_error(head, text):
     try:
         found = stream.parse(head + text)
@@ -210,12 +237,16 @@ def test_a_comment_that_was_read_can_be_written_whatever_editors_take_for_the_en
         (Power(0, 0, 0, 2), ""),
         (RadioState(0, 0, "off"), ""),
         (PinLevel(0, "P4.0", 1), ""),
+        (Put(0, 0, 0, "eyes", 1), ""),
+        (Put(0, 0, 5, "eyes.d", 1), ""),
+        (Put(0, 0, 0, "eyes.d", 1e400), ""),
+        (Put(0, 0, 0, "eyes.d", "\ud800"), ""),
         (Transmission(0, ">", b"a"), "two\nlines"),
         (Transmission(0, ">", b"a"), " blank"),
     ],
 )
 def test_what_could_not_be_read_back_is_not_written(wrong, comment):
-    with pytest.raises(ValueError, match=r"must be|at least one"):
+    with pytest.raises(ValueError, match=r"must be|at least one|cannot be put|half a character"):
         stream.format_line(wrong, comment)
 
 

@@ -24,7 +24,7 @@ from miro_exact.clock import seconds
 from miro_protocol import pcapng, stream
 from miro_protocol.events import Damaged, Received
 from miro_protocol.frames import Message, ServiceFrame, TeamFrame, describe
-from miro_protocol.stream_line import FIRST_LINE, needs_version_2
+from miro_protocol.stream_line import FIRST_LINE, version_of
 from miro_protocol.table import FLAG_MEANINGS, SERVICE_DATA, TELEMETRY_FIELDS, VELOCITY, FrameType, Opcode
 from miro_protocol.transmission import Transmission, character_ticks
 from mirotwin.recording.capture.rows import DecodedRow, rows
@@ -207,7 +207,7 @@ def to_stream(sent: Iterable[Transmission], layout: Callable[[int], int]) -> Ite
                     transmission.tick, problem, "sort the capture first (`reordercap` does)"
                 )
             last = transmission.tick
-            version = max(version, 1 + needs_version_2(transmission))
+            version = max(version, version_of(transmission))
             comment = "; ".join(described(row) for row in rows([transmission], layout))
             lines.write(f"{stream.format_line(transmission, comment)}\n".encode())
         yield f"{FIRST_LINE.format(version)}\n".encode()

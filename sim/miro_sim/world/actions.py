@@ -1,4 +1,5 @@
-"""What somebody does to the robots and the radio of a network at a tick: reset pins, supplies, radio on and off.
+"""What somebody does to the devices and the radio of a line at a tick: reset pins, supplies, radio on and off, and the
+values of a board's parts.
 
 An action takes effect before anything else happens at its tick. The radio is settled a little ahead of the robots, so
 its band down changes `SETTLE_TICKS` earlier than the rest, for the same tick: RADIO_DOWN and RADIO_UP are two entries.
@@ -12,27 +13,32 @@ from typing import TYPE_CHECKING, NamedTuple
 
 from miro_exact.clock import NEVER_TICK
 from miro_exact.state import Rows
-from miro_protocol.actions import Action, Power, RadioState, Reset
+from miro_protocol.actions import PUT_BYTES, Action, Power, Put, RadioState, Reset, put_of
 from miro_sim.radio.params import LINK_STATES
 from miro_sim.world.events import PC, Event
 
 if TYPE_CHECKING:
+    from miro_sim.world.device import Device
     from miro_sim.world.medium import Medium
 
 SETTLE_TICKS = 120
 """How far beyond a robot's stop the line must be known: an instruction may overrun by four machine cycles."""
-RESET, POWER, RADIO_DOWN, RADIO_UP = range(4)
-_EVENTS = {RESET: "reset", POWER: "power", RADIO_UP: "radio"}
+RESET, POWER, RADIO_DOWN, RADIO_UP, PUT = range(5)
+_EVENTS = {RESET: "reset", POWER: "power", RADIO_UP: "radio", PUT: "put"}
 _MOST_WAITING = 1 << 16
 
 
 class WaitingAction(NamedTuple):
-    """An action that waits for `tick`. `slot`: 0 for the radio's; `value`: a level, or the number of a link's state."""
+    """An action that waits for `tick`. `slot`: 0 for the radio's; `value`: a level, or the number of a link's state.
+
+    `text`: of a put, `PART.KEY = VALUE` in UTF-8.
+    """
 
     tick: int
     what: int
     slot: int
     value: int
+    text: bytes = b""
 
 
 class Actions:
@@ -43,9 +49,10 @@ class Actions:
             *(
                 _MOST_WAITING,
                 ("q", -SETTLE_TICKS, NEVER_TICK),
-                ("B", RESET, RADIO_UP),
+                ("B", RESET, PUT),
                 ("B", 0, 255),
                 ("B", 0, 2),
+                ("s", PUT_BYTES),
             ),
             split=tuple,
             make=lambda cells: WaitingAction(*cells),
@@ -79,6 +86,8 @@ class Actions:
             value = LINK_STATES.index(action.state)
             self.waiting.append(WaitingAction(action.tick - SETTLE_TICKS, RADIO_DOWN, 0, value))
             self.waiting.append(WaitingAction(action.tick, RADIO_UP, 0, value))
+        elif isinstance(action, Put):
+            self.waiting.append(WaitingAction(action.tick, PUT, action.slot, 0, action.text.encode()))
         elif isinstance(action, Reset):
             self.waiting.append(WaitingAction(action.tick, RESET, action.slot, action.level))
         else:
@@ -100,6 +109,7 @@ class Actions:
                 network=self.network,
                 slot=slot,
                 value=action.value,
+                data=action.text,
             )
             medium.log.note(event)
 
@@ -107,17 +117,30 @@ class Actions:
         if action.what == RADIO_UP:
             medium.set_radio(action.value, up=True)
             return RadioState(action.tick, self.network, LINK_STATES[action.value])
-        board = medium.device(action.slot).board
+        device = medium.device(action.slot)
+        if action.what == PUT:
+            put = self._put(action)
+            device.put(put.path, put.value, action.tick)
+            return put
+        board = device.board
         if action.what == RESET:
             board.set_reset(action.value)
             return Reset(action.tick, self.network, action.slot, action.value)
         board.set_power(action.value)
         return Power(action.tick, self.network, action.slot, action.value)
 
-    def check(self, slots: Sequence[int]) -> None:
-        """Raises ValueError for a robot that is not in `slots`, and a level other than 0 and 1."""
+    def _put(self, action: WaitingAction) -> Put:
+        return put_of(action.tick, self.network, action.slot, action.text.decode())
+
+    def check(self, devices: Sequence[Device]) -> None:
+        """Raises ValueError for a device that is not there, a level other than 0 and 1, and what no part takes."""
+        slots = [device.slot for device in devices]
         for action in self.waiting:
-            if action.what in (RESET, POWER) and (action.slot not in slots or action.value > 1):
+            if action.what == PUT and action.slot in slots:
+                put = self._put(action)
+                devices[slots.index(action.slot)].check_put(put.path, put.value)
+                continue
+            if action.what in (RESET, POWER, PUT) and (action.slot not in slots or action.value > 1):
                 raise ValueError(
                     f"an action waits for slot {action.slot} with level {action.value}, at tick {action.tick}"
                 )

@@ -6,6 +6,7 @@ from collections.abc import Callable
 from typing import Any
 
 from miro_exact.clock import CYCLE_TICKS
+from miro_protocol.actions import PutValue
 from miro_robot.event_log import TRUE
 from miro_robot.image import Image
 from miro_robot.processor_board import ProcessorBoard
@@ -67,6 +68,24 @@ class Device:
                 if (when == "instruction" or step_tick == sample_tick) and predicate(self):
                     board.log.note(TRUE, reached, 0, 0)
         return stopped
+
+    # Parts of a board
+
+    def check_put(self, path: str, value: PutValue) -> None:
+        """Raises ValueError for a part or a key that is not there, and for a value that the part does not take."""
+        raise ValueError(f"net{self.network}/robot{self.slot} has no parts to put values of")
+
+    def put(self, path: str, value: PutValue, tick: int) -> None:
+        """Puts a value of a part at `tick`, between two instructions."""
+        raise NotImplementedError
+
+    def value(self, path: str) -> float | int | bool | str:
+        """A value of a part (`PART.KEY`) as it is now. Raises ValueError for a part or a key that is not there."""
+        raise ValueError(f"net{self.network}/robot{self.slot} has no parts with values")
+
+    def values(self) -> dict[str, float | int | bool | str]:
+        """All values of its parts as they are now, by path."""
+        return {}
 
     def sample_tick(self) -> int:
         """The next tick for predicates that are not evaluated after each instruction."""

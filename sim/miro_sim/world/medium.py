@@ -12,10 +12,10 @@ from typing import Any
 
 from miro_exact.clock import CYCLE_TICKS
 from miro_exact.state import TICK, Rows
-from miro_protocol.actions import Action, RadioState, Reset, ScriptItem
+from miro_protocol.actions import Action, Put, RadioState, Reset, ScriptItem
 from miro_protocol.decoder import Symbol
 from miro_protocol.transmission import DOWN, Transmission, check_bad_stop
-from miro_sim.periods import RobotPeriod
+from miro_sim.periods import PartValues, RobotPeriod
 from miro_sim.world.actions import SETTLE_TICKS, Actions
 from miro_sim.world.device import Device
 from miro_sim.world.events import HostLog
@@ -105,6 +105,10 @@ class Medium:
         """What the host sent and received in the period that is over."""
         raise NotImplementedError
 
+    def part_values(self, tick: int) -> Sequence[PartValues]:
+        """The values of the parts of its boards, at `tick`."""
+        return ()
+
     # Input
 
     def free_tick(self) -> int:
@@ -136,7 +140,10 @@ class Medium:
         """Raises ValueError for an action that cannot be done here."""
         if isinstance(action, RadioState):
             raise ValueError(f"net{self.index}: is a wire, which has no radio")
-        self.device(action.slot)
+        device = self.device(action.slot)
+        if isinstance(action, Put):
+            device.check_put(action.path, action.value)
+            return
         level = action.level if isinstance(action, Reset) else action.on
         if level not in (0, 1):
             raise ValueError(f"net{self.index}/robot{action.slot}: level {level!r}; give 0 or 1")
@@ -177,7 +184,7 @@ class Medium:
         """
         if self.actions.next_tick < tick - SETTLE_TICKS:
             raise ValueError(f"an action waits for tick {self.actions.next_tick}, at tick {tick}")
-        self.actions.check([device.slot for device in self.devices])
+        self.actions.check(self.devices)
         free_tick = self.free_tick()
         if free_tick > tick + LONGEST_TRANSMISSION_TICKS:
             raise ValueError(f"the transmitter is busy until tick {free_tick}, at tick {tick}")

@@ -6,11 +6,14 @@ from collections.abc import Callable, Sequence
 
 from miro_exact.clock import CHARACTER_BITS, CYCLE_TICKS
 from miro_exact.state import TICK
-from miro_protocol.actions import ScriptItem
+from miro_protocol.actions import PutValue, ScriptItem
 from miro_protocol.transmission import UP, Transmission, check_bad_stop, of_symbols
 from miro_robot.empty_board import EmptyBoard
 from miro_robot.image import Image
 from miro_robot.mcs51.cpu import STOPPED
+from miro_robot.parts.values import checked_put, checked_read
+from miro_robot.wired_board import WiredBoard
+from miro_sim.periods import PartValues
 from miro_sim.scenario.board import FASTEST_BIT_TICKS, BoardScenario
 from miro_sim.world.actions import SETTLE_TICKS
 from miro_sim.world.device import Device
@@ -23,14 +26,37 @@ _STOP = CHARACTER_BITS - 1
 
 
 class BoardAlone(Device):
-    """A board with nothing around it."""
+    """A board on a wire. `parts`: the keys of those that are on it, by name."""
 
-    NOT_STATE = ("sample_ticks",)
+    NOT_STATE = ("sample_ticks", "parts")
 
     def __init__(self, board: EmptyBoard, network: int, image: Image) -> None:
         Device.__init__(self, board, network, 0, image)
         self.board: EmptyBoard
         self.sample_ticks = board.spec.crystal_hz // 1000
+        self.parts = {part.name: part.keys for part in board.parts} if isinstance(board, WiredBoard) else {}
+
+    def check_put(self, path: str, value: PutValue) -> None:
+        checked_put(self.parts, path, value)
+
+    def put(self, path: str, value: PutValue, tick: int) -> None:
+        part, key, taken = checked_put(self.parts, path, value)
+        self._wired.put(part, key, taken, tick)
+
+    def value(self, path: str) -> float | int | bool | str:
+        return self._wired.value(*checked_read(self.parts, path))
+
+    def values(self) -> dict[str, float | int | bool | str]:
+        return {
+            f"{name}.{key}": self._wired.value(name, key)
+            for name, keys in self.parts.items()
+            for key in keys.READS
+        }
+
+    @property
+    def _wired(self) -> WiredBoard:
+        assert isinstance(self.board, WiredBoard), "a board without parts has no values"
+        return self.board
 
     def sample_tick(self) -> int:
         """Every millisecond."""
@@ -154,6 +180,10 @@ class Wire(Medium):
         transmissions = [*self.sent, *of_symbols(self.heard, UP, self.index, self.character_ticks)]
         self.heard = []
         return transmissions
+
+    def part_values(self, tick: int) -> list[PartValues]:
+        device = self.devices[0]
+        return [PartValues(self.index, device.slot, tick, device.values())] if device.parts else []
 
     def link_counts(self) -> tuple[int, int]:
         return self.transmissions, 0

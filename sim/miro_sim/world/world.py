@@ -25,7 +25,7 @@ from miro_protocol.actions import Action, Power, RadioState, Reset, ScriptItem
 from miro_protocol.transmission import DOWN, Transmission
 from miro_robot.faults import FirmwareFault
 from miro_robot.image import Image
-from miro_sim.periods import Period, RobotPeriod
+from miro_sim.periods import PartValues, Period, RobotPeriod
 from miro_sim.radio.params import LinkState
 from miro_sim.scenario.board import MOST_PERIODS, BoardScenario
 from miro_sim.world.actions import SETTLE_TICKS
@@ -154,6 +154,12 @@ class World:
         return [device for device in self.devices if isinstance(device, Robot)]
 
     @property
+    def bit_ticks(self) -> int:
+        """Length of the bits that the host of a board sends; 0 where that is not known yet, and for robots."""
+        line = self.lines[0]
+        return line.bit_ticks if isinstance(line, Wire) else 0
+
+    @property
     def faults(self) -> list[FirmwareFault]:
         """Firmware faults of all devices, in their order."""
         return [fault for device in self.devices for fault in device.board.faults]
@@ -236,10 +242,10 @@ class World:
         return device
 
     def do(self, action: Action) -> int:
-        """Announces what is done to a robot or a radio at a tick: `Reset`, `Power`, `RadioState`; returns the tick.
+        """Announces what is done at a tick, before all else: `Reset`, `Power`, `RadioState`, `Put`; returns the tick.
 
-        Before anything else that happens at that tick. Raises ValueError for a tick before `earliest_action_tick`, a
-        network or a robot that is not there, and for levels other than 0 and 1.
+        Raises ValueError for a tick before `earliest_action_tick`, a network, robot, part or key that is not there, a
+        value that the part does not take, and for levels other than 0 and 1.
         """
         self._announce(action, self.earliest_action_tick)
         return action.tick
@@ -337,10 +343,13 @@ class World:
         self.index += 1
         self.chain = hashlib.sha256(self.state.hashed()).digest()
         actions: list[Action] = []
+        values: list[PartValues] = []
         for line in self.lines:
             actions += line.actions.take()
+            values += line.part_values(self.tick)
         begun = index * self.period_ticks
-        self.last = Period(index, begun, tuple(robots), tuple(wire), self.chain.hex(), tuple(actions))
+        records = tuple(robots), tuple(wire), self.chain.hex(), tuple(actions), tuple(values)
+        self.last = Period(index, begun, *records)
         for observer in self.observers:
             observer(self.last)
 
