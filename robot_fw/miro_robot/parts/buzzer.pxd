@@ -1,0 +1,14 @@
+cimport cython
+from miro_robot.parts.part cimport Part
+
+cdef int _SLOWEST_HZ
+
+cdef class BuzzerPart(Part):
+    cdef readonly int is_passive, flow_level
+    cdef readonly long long longest_ticks
+    cdef public int flows, has_flowed
+    cdef public long long flowed_tick, period_ticks, sounded_ticks
+
+    @cython.locals(period_ticks='long long')
+    cdef _pulse(self, long long tick)
+    cdef long long _tone_ticks(self, long long tick) noexcept
