@@ -7,7 +7,10 @@ from typing import Any, ClassVar
 import msgspec
 
 from miro_exact.clock import NEVER_TICK
+from miro_protocol.actions import PutValue
 from miro_robot.board_spec import BoardSpec
+from miro_robot.parts.keys import PartKeys
+from miro_robot.parts.values import checked_put
 from miro_sim.scenario.terminal import TerminalSpec
 
 MOST_PERIODS = 1 << 34
@@ -25,10 +28,13 @@ class BoardScenario(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_
     The wire's host is the `terminal`, or who injects, or a script. `bit_ticks`: length of the host's bits, 0 for those
     of the board's receiver. `duration_ticks`: default, without end. `stop_at`: the run stops before an instruction at
     one of these addresses; `stop_at_end`: when the program has ended; `stop_on_fault`: at the first firmware fault.
-    `begin_tick`: the firmware has started up, and is judged from then on.
-    Raises ValueError for values out of range.
+    `begin_tick`: the firmware has started up, and is judged from then on. `put`: values of parts at power-on, by
+    PART.KEY. `step`: what is done during the run, as of a scenario of robots.
+    Raises ValueError for values out of range, and for a value that no part takes.
     """
 
+    name: str = "board"
+    title: str = ""
     board: BoardSpec = BoardSpec()
     duration_ticks: int | None = None
     stop_on_fault: bool = True
@@ -37,7 +43,9 @@ class BoardScenario(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_
     bit_ticks: int = 0
     terminal: TerminalSpec | None = None
     begin_tick: int = 0
+    put: dict[str, PutValue] = {}
     expect: dict[str, Any] = {}
+    step: tuple[dict[str, Any], ...] = ()
     period_ticks: ClassVar[int] = PERIOD_TICKS
     """From one digest to the next."""
 
@@ -48,10 +56,13 @@ class BoardScenario(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_
 
         if not 0 <= self.begin_tick <= LATEST_BEGIN_TICK:
             raise ValueError(f"begin_tick {self.begin_tick} is outside 0..{LATEST_BEGIN_TICK}")
+        for path, value in self.put.items():
+            checked_put(self.parts, path, value)
 
     @property
-    def name(self) -> str:
-        return self.board.name
+    def parts(self) -> dict[str, PartKeys]:
+        """The keys of the board's parts, by name."""
+        return {name: part.keys for name, part in self.board.parts.items()}
 
     @property
     def clock(self) -> int:

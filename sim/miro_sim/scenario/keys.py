@@ -195,7 +195,7 @@ def scenario_of(tables: dict[str, Any]) -> Scenario:
 def without_expectations(scenario: Scenario | BoardScenario) -> Scenario | BoardScenario:
     """The same scenario, of which nothing is expected, without steps: all that a world depends on."""
     if isinstance(scenario, BoardScenario):
-        return msgspec.structs.replace(scenario, expect={})
+        return msgspec.structs.replace(scenario, expect={}, step=())
     networks = []
     for network in scenario.networks:
         robots = tuple(msgspec.structs.replace(robot, expect={}) for robot in network.robot)

@@ -8,6 +8,8 @@ from miro_exact.clock import CHARACTER_BITS, CYCLE_TICKS
 from miro_exact.state import TICK
 from miro_protocol.actions import PutValue, ScriptItem
 from miro_protocol.transmission import UP, Transmission, check_bad_stop, of_symbols
+from miro_robot.board_spec import BoardSpec
+from miro_robot.build import board_of
 from miro_robot.empty_board import EmptyBoard
 from miro_robot.image import Image
 from miro_robot.mcs51.cpu import STOPPED
@@ -23,6 +25,11 @@ from miro_sim.world.outbox import Outbox
 from miro_sim.world.terminal import Terminal, moves
 
 _STOP = CHARACTER_BITS - 1
+
+
+def _bit_ticks(board: BoardSpec) -> int:
+    """Length of a bit at the board's baud, rounded; 0 for the receiver's own."""
+    return (board.crystal_hz + board.baud // 2) // board.baud if board.baud else 0
 
 
 class BoardAlone(Device):
@@ -44,7 +51,8 @@ class BoardAlone(Device):
         self._wired.put(part, key, taken, tick)
 
     def value(self, path: str) -> float | int | bool | str:
-        return self._wired.value(*checked_read(self.parts, path))
+        part, key = checked_read(self.parts, path)
+        return self._wired.value(part, key)
 
     def values(self) -> dict[str, float | int | bool | str]:
         return {
@@ -77,24 +85,31 @@ class Wire(Medium):
     NOT_STATE = ("character_ticks", "output")
 
     def __init__(
-        self, scenario: BoardScenario, index: int, image: Image, script: Sequence[ScriptItem] | None
+        self,
+        scenario: BoardScenario,
+        seed: int,
+        index: int,
+        image: Image,
+        script: Sequence[ScriptItem] | None,
     ) -> None:
         stops = (scenario.stop_on_fault, scenario.stop_at, scenario.stop_at_end)
-        board = EmptyBoard(scenario.board, image, *stops)
+        board = board_of(scenario.board, image, seed, *stops)
         board.sent = self._sent
         sending = sent_to(index, script)
         self.terminal = None if scenario.terminal is None else Terminal(scenario.terminal, board)
         host = "script" if sending is not None else "silent" if self.terminal is None else "terminal"
-        self.bit_ticks = scenario.bit_ticks  # 0: not known yet
+        self.bit_ticks = scenario.bit_ticks or _bit_ticks(scenario.board)  # 0: not known yet
         self.busy_tick = 0
         self.transmissions = 0
         self.character_ticks = 0  # of the last one that the board sent
         self.output: Callable[[bytes], object] | None = None
-        outbox = Outbox(0, index, CHARACTER_BITS * scenario.bit_ticks)
+        outbox = Outbox(0, index, CHARACTER_BITS * self.bit_ticks)
         log = HostLog(index, lambda tick: tick, 0)
         alone = BoardAlone(board, index, image)
         if scenario.terminal is not None:
             alone.pin_moves = moves(scenario.terminal.pins)
+        for path, value in sorted(scenario.put.items()):
+            alone.put(path, value, 0)
         Medium.__init__(self, index, host, [alone], outbox, log)
         if sending and not self.bit_ticks:
             raise ValueError(f"net{index}: how long a bit of the script is must be given (bit_ticks)")

@@ -97,7 +97,7 @@ class World:
         _check_senders(script or (), 1 if isinstance(scenario, BoardScenario) else len(scenario.networks))
         self.bodies: Bodies | None = None
         if isinstance(scenario, BoardScenario):
-            self.lines: list[Medium] = [Wire(scenario, 0, image, script)]
+            self.lines: list[Medium] = [Wire(scenario, seed, 0, image, script)]
         else:
             from miro_sim.world.bodies import Bodies
             from miro_sim.world.network import networks_of
