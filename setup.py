@@ -57,8 +57,9 @@ SCALAR = ["-fno-tree-slp-vectorize", *SSE]
 HOTTEST = re.compile(
     r"miro_exact\.(dmath|memory|rng)|miro_host\.eye\.regions"
     r"|miro_robot\.(board|harness\.(fast_oracle|harness)|lm629\.(bus_timing|chip|encoder|pid))"
+    r"|miro_robot\.(wired_board|parts\.(lm629|nets|part))"
     r"|miro_robot\.mcs51\.(chip|cpu|interrupts|line|peripherals|timers|uart)"
-    r"|miro_sim\.pitch\.(camera|rays|scene|sensor)|miro_sim\.plant\.(chassis|drive|rough)"
+    r"|miro_sim\.pitch\.(camera|rays|scene|sensor)|miro_sim\.plant\.(chassis|differential_drive|drive|rough)"
 )
 """What takes half a percent of a run or more. The others are compiled with -Og, which takes a third of the time."""
 QUICKLY = ["-Og", "-finline-small-functions"]  # among them those that count references

@@ -34,6 +34,7 @@ def board_of(
 
 def parts_of(spec: BoardSpec, netlist: Netlist, seed: int) -> list[Part]:
     """The parts of a board, in the order of their names, each with those that share a net with it. Raises BadInput."""
+    at_cpu = {*netlist.ports, *(net for buffer in netlist.buffers for net in buffer)}
     places = [
         Place(
             name=name,
@@ -41,6 +42,7 @@ def parts_of(spec: BoardSpec, netlist: Netlist, seed: int) -> list[Part]:
             noise=Stream(seed, name),
             connected=frozenset(pin for pin, on in enumerate(pins) if on.net >= 0),
             peers={pin: [] for pin, on in enumerate(pins) if on.net >= 0},
+            at_cpu=frozenset(pin for pin, on in enumerate(pins) if on.net >= 0 and on.net in at_cpu),
         )
         for name, pins in zip(spec.parts, netlist.parts, strict=True)
     ]

@@ -20,5 +20,6 @@ cdef class WiredBoard(EmptyBoard):
     cpdef int sync(self, long long tick) except -1
     @cython.locals(port=int, net=int, due='long long')
     cdef int _push(self, long long tick) except -1
-    cdef _contention(self, int net, long long tick)
+    cdef _note_faults(self, long long tick)
+    cdef _note(self, int kind, str detail, long long tick)
     cdef _supply(self, int on, long long tick)

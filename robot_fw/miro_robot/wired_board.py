@@ -11,6 +11,7 @@ a tick does what happens before it; what a test puts then comes first on its tic
 from __future__ import annotations
 
 from collections.abc import Sequence
+from operator import itemgetter
 from typing import Any
 
 from miro_exact.clock import CYCLE_TICKS
@@ -29,6 +30,7 @@ from miro_robot.parts.part import Part
 _CONTENTION = int(FaultKind.NET_CONTENTION)
 _BEHIND_TICKS = 96  # more than an instruction: so far parts may be behind the CPU
 _FAULTS_KEPT = FAULTS_KEPT
+_order_and_kind = itemgetter(0, 1)
 
 
 class WiredBoard(EmptyBoard):
@@ -105,7 +107,9 @@ class WiredBoard(EmptyBoard):
                 self.cpu.set_external(port, nets.external[port], tick)
         if nets.new_contention >= 0:
             net, nets.new_contention = nets.new_contention, -1
-            self._contention(net, tick)
+            self._note(_CONTENTION, f"net {nets.names[net]}: {' and '.join(nets.drivers(net))}", tick)
+        if nets.faults:
+            self._note_faults(tick)
         if self.horizon >= 0:
             due = nets.reach_tick()
             if due < self.horizon:
@@ -123,17 +127,26 @@ class WiredBoard(EmptyBoard):
         else:
             nets.latches[port] = latch
 
-    def _contention(self, net: int, tick: int) -> None:
+    def _note_faults(self, tick: int) -> None:
+        """What parts have found on this tick: of several parts the first one's, where order and kind are the same."""
+        found = sorted(self.nets.faults, key=_order_and_kind)
+        self.nets.faults = []
+        before = None
+        for fault in found:
+            if _order_and_kind(fault) != before:
+                self._note(fault[1], fault[2], tick)
+            before = _order_and_kind(fault)
+
+    def _note(self, kind: int, detail: str, tick: int) -> None:
         """A fault, but while RST or the supply move pins."""
         if self.forced:
             return
         self.fault_count += 1
         pc = self.cpu.at
-        self.log.note(FAULT, tick, _CONTENTION, pc)
+        self.log.note(FAULT, tick, kind, pc)
         if len(self.faults) < _FAULTS_KEPT:
-            detail = f"net {self.nets.names[net]}: {' and '.join(self.nets.drivers(net))}"
             symbol = self.image.symbols.name_at(pc)
-            self.faults.append(FirmwareFault(FaultKind.NET_CONTENTION, tick, pc, symbol, detail))
+            self.faults.append(FirmwareFault(FaultKind(kind), tick, pc, symbol, detail))
         if self.stop_on_fault:
             self.cpu.request_stop()
 

@@ -32,8 +32,8 @@ class Pin(NamedTuple):
 class Place(msgspec.Struct, frozen=True):
     """Where a part is soldered: its name on the board, the crystal, its noise, and who shares the nets of its pins.
 
-    `peers`: by pin, the other parts on its net with the index of their pin; parts that are made later are put in before
-    `start`.
+    `at_cpu`: pins on a net with a port pin, or that a MOVX reads. `peers`: by pin, the other parts on its net with the
+    index of their pin; parts that are made later are put in before `start`.
     """
 
     name: str
@@ -41,6 +41,7 @@ class Place(msgspec.Struct, frozen=True):
     noise: Stream
     connected: frozenset[int]
     peers: dict[int, list[tuple[Part, int]]]
+    at_cpu: frozenset[int] = frozenset()
 
 
 class PartKeys(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_only=True, tag_field="part"):

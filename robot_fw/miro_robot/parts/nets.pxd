@@ -28,6 +28,7 @@ cdef class Nets:
     cdef readonly int wired[4]
     cdef int ports_changed
     cdef public int new_contention
+    cdef public list faults
     cdef int is_waiting[64]
     cdef int is_moving[64]
     cdef int moving

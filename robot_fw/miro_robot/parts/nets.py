@@ -42,6 +42,7 @@ class Nets:
     """Nets of a board, by the numbers of its `netlist`, with its `parts` in the order of their names.
 
     `external`: by port, what the outside puts on its pins; `ports_changed`: bit per port, since it was last taken.
+    `faults`: of the firmware, as parts have found them, until they are taken: order, kind, detail.
     `contended`: nets on which a strong low meets a strong high, as last judged; `new_contention`: one that has begun.
     `edges`: None, or a list of yours that gets (tick, net, level) of the nets that are `watch`ed.
     """
@@ -73,6 +74,9 @@ class Nets:
         self.wired = [0] * 4
         self.ports_changed = 0
         self.new_contention = -1
+        self.faults: list[
+            tuple[int, int, str]
+        ] = []  # of the firmware, that parts have found: order, kind, detail
         self.is_waiting = [0] * 64  # parts with pending pins
         self.is_moving = [0] * 64  # parts that have driven pins
         self.moving = 0  # how many
@@ -322,6 +326,9 @@ class Nets:
         part = self._part(index)
         if part.next_tick <= tick:
             raise self._too_early(index, tick)
+        if part.faults:
+            self.faults += part.faults
+            part.faults = []
         if part.moved and not self.is_moving[index]:
             self.is_moving[index] = 1
             self.moving += 1

@@ -11,11 +11,13 @@ cdef class Part:
     cdef public unsigned int pending, moved
     cdef public unsigned char wanted[32]
     cdef public unsigned char drives[32]
+    cdef public list faults
 
     cpdef int level(self, int pin) noexcept
     cpdef int others(self, int pin) noexcept
     cpdef int is_driven(self, int pin) noexcept
     cpdef int drive(self, int pin, int level) except -1
+    cpdef fault(self, int kind, str detail, int order=*)
     cpdef long long ticks(self, double us) except? -1
     cpdef start(self, long long tick)
     cpdef supply(self, int on, long long tick)

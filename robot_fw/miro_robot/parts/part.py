@@ -37,6 +37,7 @@ class Part:
     NOT_STATE: tuple[str, ...] = (
         *("keys", "place", "name", "crystal_hz", "continuous", "senses_drive"),
         *("levels", "outside", "driven", "pending", "wanted", "moved"),  # follow from the drives of all
+        "faults",  # the board takes them at once
     )
     CONTINUOUS = False
     """Whether it moves on all the time: `advance` is called before each event of a part that is wired to it."""
@@ -61,6 +62,7 @@ class Part:
         self.moved = 0  # pins that the part has driven since the last wave
         self.wanted = [RELEASED] * 32
         self.drives = [RELEASED] * 32
+        self.faults: list[tuple[int, int, str]] = []  # order, kind, detail: since the last call
 
     # What it may ask and do
 
@@ -81,6 +83,14 @@ class Part:
         if self.wanted[pin] != level:
             self.wanted[pin] = level
             self.moved |= 1 << pin
+
+    def fault(self, kind: int, detail: str, order: int = 0) -> None:
+        """The firmware does to the part what it must not (`faults.py`), on the tick of this call.
+
+        What it does to several parts on one tick is one fault if kind and `order` are the same: of a tick, those of
+        lower order come first.
+        """
+        self.faults.append((order, kind, detail))
 
     def ticks(self, us: float) -> int:
         """Microseconds to ticks, rounded half up."""

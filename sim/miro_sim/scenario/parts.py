@@ -4,7 +4,9 @@ from miro_exact.plugins import Registry
 from miro_robot.parts import ELECTRONICS
 from miro_robot.parts.keys import PartKeys
 
-MOVING: dict[str, str] = {}
+MOVING: dict[str, str] = {
+    "differential_drive": "miro_sim.plant.differential_drive:Drive",
+}
 """Parts that move: name to the struct of its keys, in `miro_sim.plant`."""
 PARTS: Registry[PartKeys] = Registry(
     word="part",
