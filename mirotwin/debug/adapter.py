@@ -23,6 +23,7 @@ from miro_exact.clock import CYCLE_TICKS
 from miro_robot.image.c_types import CType
 from miro_robot.inspect.writes import Bytes
 from miro_robot.mcs51.opcodes import SFRS
+from mirotwin.debug.board_values import GROUPS, value_on
 from mirotwin.debug.console import VERBS, Console, shown_value
 from mirotwin.debug.debugger import STEPPED, Breakpoint, Debugger
 from mirotwin.debug.expression import Term, Value, children, content, expression
@@ -379,11 +380,9 @@ class Adapter:
     def on_scopes(self, given: Message) -> Message:
         scopes = []
         for title, hint, values in self._scopes(self._moment(given["frameId"])):
-            path = (
-                f"{title.removeprefix('Statics of ').removesuffix('.c')}:"
-                if title.startswith("Statics")
-                else ""
-            )
+            path = title.lower() if title.lower() in GROUPS else ""
+            if title.startswith("Statics"):
+                path = f"{title.removeprefix('Statics of ').removesuffix('.c')}:"
             reference = {"variablesReference": self._reference_to(values, path), "expensive": False}
             scopes.append({"name": title, "presentationHint": hint, **reference})
         return {"scopes": scopes}
@@ -402,6 +401,9 @@ class Adapter:
             for side, chip in children(moment.find("lm629", "")):
                 yield f"LM629 {side}", None, children(chip())
             yield "Radio", None, self._radio()
+        for title in GROUPS:
+            if group := value_on(moment.core.device.board, title):
+                yield title.capitalize(), None, children(group)
         yield "Pins", None, children(moment.find("pins", ""))
 
     def _reference_to(self, values: Iterable[tuple[str, Shown]], path: str = "") -> int:

@@ -44,9 +44,10 @@ VERBS = {
     "goto": "goto TIME: 1.5s, 20ms or 48000t of the run, forwards or backwards",
     "help": "this list",
     "list": "the source around, or around FILE:LINE|SYMBOL|ADDRESS; the instructions without it",
-    "print": "print EXPR: variables, registers, SFR bits, lm629.left, pins, iram[0x30], tick",
+    "print": "print EXPR: variables, registers, SFR bits, lm629.left, pins, iram[0x30], tick, parts, nets",
     "quit": "leave",
-    "until": f"until CONDITION [KEY=VALUE ..]: on to an event: {', '.join(CONDITIONS)}",
+    "until": "until EXPR: on to where it is true, looked at every millisecond; or until EVENT [KEY=VALUE ..]: "
+    + ", ".join(CONDITIONS),
     "watch": "watch VAR [if EXPR]: stop before an instruction that writes it",
     "where": "the functions under way; where N: `print` means the names of frame N",
     "who": "who VAR: its last writer before now, with the functions under way there",
@@ -156,12 +157,17 @@ class Console(Cmd):
         self.say(self.debugger.go_to(tick))
 
     def _until(self, rest: str) -> None:
+        word = rest.partition(" ")[0]
+        if rest and word not in CONDITIONS and (word in self.symbols.known or not word.isidentifier()):
+            self.say(self.debugger.until_true(rest))
+            return
         try:
             name, *keys = shlex.split(rest) or [""]
         except ValueError as error:
             raise BadInput("", rest, f"{error}") from None
         if name not in CONDITIONS:
-            raise BadInput("until", name, "is no condition", f"there are {', '.join(CONDITIONS)}")
+            remedy = f"give an expression, or one of {', '.join(CONDITIONS)}"
+            raise BadInput("until", name, "is no condition and no name", remedy)
         device, kind = self.timeline.core.device, CONDITIONS[name]
         fields = kind.__struct_fields__
         given: dict[str, Any] = {"network": device.network}

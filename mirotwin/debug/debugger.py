@@ -20,7 +20,7 @@ from miro_robot.inspect.frames import StackFrame
 from miro_robot.inspect.writes import Bytes
 from miro_robot.mcs51.cpu import Cpu
 from miro_robot.mcs51.opcodes import LENGTH, SFRS, byte_of_bit, is_call
-from miro_sim.world.conditions import Condition
+from miro_sim.world.conditions import Condition, When
 from mirotwin.debug.expression import NoValue, Term, Value, expression, number
 from mirotwin.debug.symbols import SIZES, Moment, Symbols
 from mirotwin.debug.timeline import Core, Hit, Position, Timeline, Trap
@@ -269,6 +269,31 @@ class Debugger:
         if event is not None:
             return str(event)
         return "no such event before the end" if self.timeline.run.over else INTERRUPTED
+
+    def until_true(self, text: str) -> str:
+        """On to the first instruction before which an expression is true, which is looked at every millisecond.
+
+        Raises BadInput where it has no value now.
+        """
+        term, core = expression(text, self.symbols.known), self.timeline.core
+
+        def is_true() -> bool:
+            return bool(number(term(Moment(self.symbols, core))))
+
+        def met(device: Any) -> bool:
+            with suppress(BadInput):  # where it has no value, it is not true
+                return is_true()
+            return False
+
+        if is_true():
+            return f"{text} is true here"
+        network, slot, begin_tick = core.device.network, core.device.slot, self.timeline.tick
+        if self.timeline.until(When(predicate=met, network=network, slot=slot)) is not None:
+            millisecond = self.timeline.run.tick_hz // 1000
+            self.timeline.go_to(max(begin_tick, self.timeline.tick - millisecond - 1))
+            self.timeline.until(When(predicate=met, network=network, slot=slot, at="instruction"))
+            return f"{text} is true"
+        return f"{text} is not true before the end" if self.timeline.run.over else INTERRUPTED
 
     def _search(
         self, seek: Callable[[Mapping[int, Trap], Position], Hit | None], step: Trap | None = None

@@ -1,6 +1,7 @@
 """Expressions of the debugger: names, `.` `->` `[]` `*` `&`, arithmetic, comparisons, as C has them.
 
     age >= 110 && !heard     frame[2].left     *pointer     lm629.left.real_position - start     R7 == 0x3F     P1.0
+    eyes.distance_cm < 30    lcd.text == "READY"
 
 An expression is read once into a function of a moment, which looks names up; so a condition costs little each time it
 is asked. Numbers do not wrap. Nothing is ever written.
@@ -21,7 +22,9 @@ from miro_exact.bad_input import BadInput, did_you_mean, shortened
 from miro_robot.image.c_types import CType, Fields, value_of
 from miro_robot.mcs51.opcodes import BITS
 
-_TOKEN = re.compile(r"\d+\.\d+|(?:[A-Za-z_]\w*:)?\w+|'(?:\\.|[^'\\])'|->|<<|>>|[<>=!]=|&&|\|\||\S")
+_TOKEN = re.compile(
+    r"""\d+\.\d+|(?:[A-Za-z_]\w*:)?\w+|'(?:\\.|[^'\\])'|"(?:\\.|[^"\\])*"|->|<<|>>|[<>=!]=|&&|\|\||\S"""
+)
 _MOST_CHARACTERS, _MOST_TOKENS, _MOST_SHIFT, _MOST_DIGITS = 4096, 128, 64, 80
 _LEVELS = ("||", "&&", "|", "^", "&", "== !=", "< <= > >=", "<< >>", "+ -", "* / %")
 _RANKS = {sign: rank for rank, signs in enumerate(_LEVELS) for sign in signs.split()}
@@ -94,11 +97,18 @@ def content(value: Value) -> Any:
     return value_of(value.kind, value.moment.read(value.space, value.address, value.kind.size), value.fields)
 
 
+def operand(value: Value) -> Any:
+    """The value as a single number or a text; of an array its address. Raises NoValue."""
+    return value.number if isinstance(value.number, str) else number(value)
+
+
 def number(value: Value) -> Any:
     """The value as a single number; of an array its address. Raises NoValue."""
     if value.kind is not None and value.kind.kind == "array":
         return value.address
     result = content(value)
+    if isinstance(result, str):
+        raise NoValue("is a text", 'compare it with one: == "READY"')
     if not isinstance(result, int | float):
         raise NoValue("is no single number", "name one of its members or elements")
     return result
@@ -187,9 +197,14 @@ _SIGNS: dict[str, Callable[..., Any]] = {
 def _applied(apply: Callable[..., Any], sign: str, *terms: Term) -> Term:
     """An operator's value of those of its operands."""
 
+    read = operand if sign in ("==", "!=") else number
+
     def applied(moment: Lookup) -> Value:
         try:
-            result = apply(*(number(term(moment)) for term in terms))
+            operands = [read(term(moment)) for term in terms]
+            if len({isinstance(value, str) for value in operands}) > 1:
+                raise NoValue(f"{sign} compares a text and a number")
+            result = apply(*operands)
             float(result)  # so that numbers do not grow without end
         except TypeError:
             raise NoValue(f"{sign} is for whole numbers") from None
@@ -292,10 +307,16 @@ class _Reader:
             if self.known and name not in self.known:
                 raise NoValue(f"there is no {name}", did_you_mean(name, self.known))
             return lambda moment: moment.find(name, module)
-        constant = Value(number=_constant(token))
+        constant = Value(number=_text(token) if token[:1] == '"' and len(token) > 1 else _constant(token))
         if constant.number is None:
             raise self.refused(f"lacks a name or a number{f' before {token}' if token else ''}")
         return lambda moment: constant
+
+
+def _text(token: str) -> str:
+    """What stands between the quotes."""
+    escaped = re.compile(r"\\(.)", re.DOTALL)
+    return escaped.sub(lambda match: chr(_ESCAPES.get(match[1], ord(match[1]))), token[1:-1])
 
 
 def _constant(token: str) -> int | float | None:
@@ -321,12 +342,14 @@ def _member_of(term: Term, name: str, text: str) -> Term:
 
     def bit(moment: Lookup) -> Value:
         value = term(moment)
+        if value.members is not None:  # a net of a latch: CTRL.0
+            return _member(value, name, text)
         bits = 32 if value.kind is None else 1 if value.kind.kind == "bit" else 8 * value.kind.size
         if index >= bits:
             raise NoValue(f"{text} has no bit {shortened(name)}", f"give 0 to {bits - 1}")
         if value.moment is not None and value.kind is not None and value.kind.kind == "int":
             kind = CType("bits", value.kind.size, first_bit=index, bits=1)
-            return msgspec.structs.replace(value, kind=kind, note="")
+            return msgspec.structs.replace(value, kind=kind, note=value.note if value.space == "sfr" else "")
         return number_of(lambda moment: value)(moment)
 
     number_of = partial(_applied, lambda word: word >> index & 1, f".{name}")

@@ -12,6 +12,7 @@ import msgspec
 
 from miro_exact.bad_input import BadInput
 from miro_exact.inputs import WORLD_BYTES, read_input
+from mirotwin.debug.board_values import names_on
 from mirotwin.debug.debugger import Debugger
 from mirotwin.debug.symbols import Symbols
 from mirotwin.debug.timeline import Timeline
@@ -76,7 +77,7 @@ def open_subject(options: DebugSubject, everyone: bool = False) -> tuple[Debugge
     if options.resume is not None:
         _resume(run, options.resume)
     images = load_images(options.lines_from, run.image)
-    symbols = Symbols(*debugged_image(run.image, images, options.sources))
+    symbols = Symbols(*debugged_image(run.image, images, options.sources), names_on(run.device.board))
     image, files = symbols.image, {line.file for line in symbols.line_begins.values()}
     timeline = Timeline(run)
     debugger, notes, why = Debugger(timeline, symbols, everyone), list[str](), "begin"

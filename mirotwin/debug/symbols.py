@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Collection
 from functools import cached_property, partial
 from operator import attrgetter
 from pathlib import PureWindowsPath as AnyPath
@@ -26,11 +26,13 @@ from miro_robot.inspect.values import bytes_at
 from miro_robot.inspect.writes import instructions_of
 from miro_robot.lm629.chip import Lm629
 from miro_robot.mcs51.opcodes import BITS, SFRS
+from mirotwin.debug.board_values import levels_put_on, value_on
 from mirotwin.debug.expression import NoValue, Value, names_in
 from mirotwin.debug.timeline import Core
 from mirotwin.firmware.code_place import address_of
 
 _BYTE, _BIT = CType("int", 1), CType("bit", 1)
+_PORTS = ("P0", "P1", "P2", "P3")
 SIZES = {"iram": 0x100, "xram": 0x10000, "code": 0x10000, "sfr": 0x100}
 _REGISTER_NAMES = {SFRS["ACC"]: "A", **{SFRS[name]: name for name in ("B", "DPL", "DPH")}}
 _MEMORIES = ("iram", "xram", "code")
@@ -44,9 +46,12 @@ _CHIP = {
 
 
 class Symbols:
-    """Of one image. `known`: names, for completion and remedies. Raises ImageError for debug files of another image."""
+    """Of one image. `known`: names, for completion and remedies, with `more` of them.
 
-    def __init__(self, image: Image, sources: Sources) -> None:
+    Raises ImageError for debug files of another image.
+    """
+
+    def __init__(self, image: Image, sources: Sources, more: Collection[str] = ()) -> None:
         self.image = image
         self.debug = DebugInfo.of(image)
         self.line = self.debug.line_at
@@ -63,7 +68,7 @@ class Symbols:
         self.instructions = instructions_of(image.code, image.used, known)
         names = [*image.symbols.names, *(name.removeprefix("_") for name in image.symbols.names)]
         names += [*self.variables.by_name, *(one.name for one in self.blocks.variables)]
-        self.known = sorted({*names, *SPECIAL, *SFRS, *BITS, *SIZES})
+        self.known = sorted({*names, *more, *SPECIAL, *SFRS, *BITS, *SIZES})
 
     # Places
 
@@ -146,6 +151,8 @@ class Moment:
         if not module and (special := self._special(name)):
             return special
         symbol = self.symbols.image.symbols.find(name)
+        if symbol is None and not module and (value := value_on(self.core.device.board, name)):
+            return value
         if symbol is None:
             owners = {one.function for one in self.symbols.blocks.variables if one.name == name}
             placed = {one.scope for one in self.symbols.variables.by_name.get(name, ())}
@@ -303,6 +310,11 @@ class Moment:
     def _special(self, name: str) -> Value | None:
         """A register, a bit, a memory, the chips."""
         cpu, board = self.core.cpu, self.core.board
+        if name in _PORTS:
+            latch = cpu.sfr(SFRS[name])
+            pins = latch & levels_put_on(self.core.device.board, _PORTS.index(name))
+            note = "" if latch == pins else f"the latch; on the pins is {pins:#04x}"
+            return Value(_BYTE, "sfr", SFRS[name], self, note=note)
         if name in SFRS or name == "A":
             return Value(_BYTE, "sfr", SFRS["ACC" if name == "A" else name], self)
         if len(name) == 2 and name[0] == "R" and name[1] in "01234567":
@@ -323,7 +335,7 @@ class Moment:
         tap = CpuTap(self.core.board, lambda: None)
         tap.attached(self.core.cpu)
         tap.detach()
-        return Value(number=port_pins(tap.start, port))
+        return Value(number=port_pins(tap.start, port) & levels_put_on(self.core.device.board, port))
 
     def read(self, space: str, address: int, count: int) -> bytes:
         """Bytes of a memory. Raises BadInput for one that is not there."""

@@ -64,9 +64,10 @@ class VcdOptions(WindowOptions, frozen=True, kw_only=True):
 def vcd(options: VcdOptions) -> int:
     """Writes what happened on the wires in SUBJECT as a VCD file, with a save file for GTKWave beside it.
 
-    The wires: RXD and TXD; on the robot, the bus and the pins of both LM629 and the encoders; interrupt routines in
-    service, sleep, port pins. Every one is a 1-bit wire; the save file puts buses together. A last stretch of less
-    than 0.1 ms may be missing at the end of a run, where its encoder edges are not known yet.
+    The wires: RXD and TXD; on the robot, the bus and the pins of both LM629 and the encoders; on a board of parts, all
+    nets; interrupt routines in service, sleep, port pins. Every one is a 1-bit wire; the save file puts buses together.
+    A last stretch of less than 0.1 ms may be missing at the end of a robot's run, where its encoder edges are not known
+    yet.
     """
     out = options.out
     save = out.with_suffix(SAVE_SUFFIX)
@@ -83,7 +84,7 @@ def vcd(options: VcdOptions) -> int:
 
     with whole_file(save, "--out") as save_staging, whole_file(out, "--out") as staging:
         with staging.open("w", encoding="ascii", newline="\n") as stream:
-            waveform = Waveform(stream, run.board, options.from_tick, options.to_tick, run.tick_hz)
+            waveform = Waveform(stream, run.device.board, options.from_tick, options.to_tick, run.tick_hz)
             run.tell_pins(waveform.pin_moved)
             early_ticks = 2 * SETTLING_TICKS
             code = look(run, options, waveform.tap, early_ticks=early_ticks, late_ticks=LATE_TICKS)

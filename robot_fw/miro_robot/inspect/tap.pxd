@@ -35,6 +35,7 @@ cdef class CpuTap(Watcher):
     cdef object told
     cdef readonly list events
     cdef BoardTap board_tap
+    cdef object net_tap
     cdef readonly long long begin_tick
     cdef readonly list start
     cdef int levels[20]
@@ -44,6 +45,7 @@ cdef class CpuTap(Watcher):
 
     cpdef long long known(self) except -1
     cpdef detach(self)
+    cpdef take(self)
     cdef int _look(self, Cpu cpu) except -1
     cdef int _leave(self, long long tick, int high, int level) except -1
     cdef int _take_outputs(self, Cpu cpu) except -1

@@ -1,4 +1,4 @@
-"""Where the wires of a robot are picked up: levels with the exact ticks at which they change.
+"""Where the wires of a board are picked up: levels with the exact ticks at which they change.
 
 Lines, CPU, chips and plant run ahead of each other, so changes are not noted in the order of their ticks;
 below the tick that `CpuTap.known` gives, all changes have been noted.
@@ -13,7 +13,10 @@ from miro_robot.board import Board
 from miro_robot.inspect.watcher import Watcher
 from miro_robot.mcs51.cpu import Cpu
 from miro_robot.mcs51.line import Line
+from miro_robot.parts.nets import Nets
 from miro_robot.probe import Probe
+from miro_robot.processor_board import ProcessorBoard
+from miro_robot.wired_board import WiredBoard
 
 _TICKS = 12  # per machine cycle
 
@@ -37,8 +40,8 @@ PLACES = (
         for pin in ("cs", "rd", "wr", "ps", "rst", "busy", "hi", "pwm", "sign", "magnitude", "a", "b")
     ),
 )
-"""What the places are. `shift`: what the serial port in mode 0 puts on RXD; `outside`: what is wired to a port puts
-on its pins; `low` and `high`: a routine of that priority is in service."""
+"""What the places are; the nets of a board of parts follow, by number. `shift`: what the serial port in mode 0 puts on
+RXD; `outside`: what is wired to a port puts on its pins; `low` and `high`: a routine of that priority is in service."""
 
 UNKNOWN = 2
 """Value of a routine's wire for a routine that was already running when recording began."""
@@ -153,16 +156,65 @@ class BoardTap(Probe):
             self.events.append((tick, place, level))
 
 
+class NetTap:
+    """Notes the edges of all nets of a board of parts into `events`, as edges of the ports too."""
+
+    def __init__(self, nets: Nets, events: list[tuple[int, int, int]]) -> None:
+        self.nets = nets
+        self.events = events
+        self.edges: list[tuple[int, int, int]] = []
+        self.outside = [0xFF] * 4
+        self.port_pins: list[list[int]] = [[] for _ in range(nets.count)]  # 8 * port + bit, by net
+        for number, net in enumerate(nets.netlist.ports):
+            if net >= 0:
+                self.port_pins[net].append(number)
+
+    def attach(self) -> list[int]:
+        """Records from now on; the levels of the nets. Raises ValueError if something else records them."""
+        if self.nets.edges is not None:
+            raise ValueError("the nets of this board are watched already; close that waveform first")
+        self.nets.edges = self.edges
+        for net in range(self.nets.count):
+            self.nets.watch(net, 1)
+            self._put_on_ports(net, self.nets.levels[net])
+        return list(self.nets.levels[: self.nets.count])
+
+    def detach(self) -> None:
+        self.nets.edges = None
+        for net in range(self.nets.count):
+            self.nets.watch(net, 0)
+
+    def known(self) -> int:
+        """The tick below which all edges have been noted: no part has an event before."""
+        return self.nets.next_tick()
+
+    def take(self) -> None:
+        """Moves what was recorded to `events`."""
+        for tick, net, level in self.edges:
+            self.events.append((tick, _PLACES + net, level))
+            for port in self._put_on_ports(net, level):
+                self.events.append((tick, _OUTSIDE + port, self.outside[port]))
+        self.edges.clear()
+
+    def _put_on_ports(self, net: int, level: int) -> list[int]:
+        """The ports on which `outside` changes."""
+        for number in self.port_pins[net]:
+            mask = 1 << (number & 7)
+            self.outside[number >> 3] = self.outside[number >> 3] & ~mask | (mask if level else 0)
+        return [number >> 3 for number in self.port_pins[net]]
+
+
 class CpuTap(Watcher):
     """Notes what happens on a CPU, and on the board around it if there is one, into `events`.
 
     Begins where it is attached, at `begin_tick`, with `start` as the levels there. After every run it calls `told`.
     """
 
-    def __init__(self, board: Board | None, told: Callable[[], object]) -> None:
+    def __init__(self, board: ProcessorBoard | None, told: Callable[[], object]) -> None:
         self.told = told
         self.events: list[tuple[int, int, int]] = []
-        self.board_tap = None if board is None else BoardTap(board, self.events)
+        self.board_tap = BoardTap(board, self.events) if isinstance(board, Board) else None
+        self.net_tap = NetTap(board.nets, self.events) if isinstance(board, WiredBoard) else None
         self.begin_tick = -1
         self.start: list[int] = []
         self.levels = [0] * 20
@@ -173,11 +225,20 @@ class CpuTap(Watcher):
     def known(self) -> int:
         """The tick below which all changes are noted."""
         tick = _TICKS * self.cycles
-        return tick if self.board_tap is None else min(tick, self.board_tap.known())
+        if self.board_tap is not None:
+            tick = min(tick, self.board_tap.known())
+        return tick if self.net_tap is None else min(tick, self.net_tap.known())
 
     def detach(self) -> None:
         if self.board_tap is not None:
             self.board_tap.detach()
+        if self.net_tap is not None:
+            self.net_tap.detach()
+
+    def take(self) -> None:
+        """Moves to `events` what the nets have recorded since the CPU ran."""
+        if self.net_tap is not None:
+            self.net_tap.take()
 
     def starting(self, cpu: Cpu) -> None:
         self._take_line(_RXD, cpu.rxd, cpu.rxd.settled_tick)
@@ -202,6 +263,7 @@ class CpuTap(Watcher):
     def ran(self, cpu: Cpu, start: int) -> None:
         self._take_outputs(cpu)
         self.cycles = cpu.cycles
+        self.take()
         self.told()
 
     def attached(self, cpu: Cpu) -> None:
@@ -213,9 +275,10 @@ class CpuTap(Watcher):
         for place, line in ((_RXD, cpu.rxd), (_TXD, cpu.txd), (_SHIFT, cpu.peripherals.shift.data)):
             self.levels[place] = line.level_at(self.begin_tick)
             self.line_ticks[place] = self.begin_tick
+        nets = [] if self.net_tap is None else self.net_tap.attach()
         for port in range(4):
             self.levels[_LATCH + port] = cpu.peripherals.ports.latches[port]
-            self.levels[_OUTSIDE + port] = 0xFF
+            self.levels[_OUTSIDE + port] = 0xFF if self.net_tap is None else self.net_tap.outside[port]
         in_service = cpu.peripherals.interrupts.in_service
         for source in range(6):
             self.levels[_ROUTINE + source] = UNKNOWN if in_service else 0
@@ -229,6 +292,7 @@ class CpuTap(Watcher):
             own = [self.board_tap.levels[place] for place in range(_PLACES)]
             self.start[_OUTSIDE:_ASLEEP] = own[_OUTSIDE:_ASLEEP]
             self.start += own[_DATA:]
+        self.start += nets
 
     def _look(self, cpu: Cpu) -> None:
         """What an instruction may have changed: with effect from the next cycle."""

@@ -1,4 +1,4 @@
-"""What happened on a robot's wires, as a VCD file, and the save file with which GTKWave shows it.
+"""What happened on the wires of a board, as a VCD file, and the save file with which GTKWave shows it.
 
 Time stamps are nanoseconds, rounded down (tick * 125 // 3 at 24 MHz, as in recordings): a crystal's period fits no
 decimal timescale, and this one loses nothing, since rounding up gives the tick again.
@@ -18,12 +18,16 @@ from miro_robot.board import Board
 from miro_robot.inspect.tap import PLACES, UNKNOWN, CpuTap, port_pins
 from miro_robot.inspect.watcher import attach, detach
 from miro_robot.mcs51.cpu import Cpu
+from miro_robot.processor_board import ProcessorBoard
+from miro_robot.wired_board import WiredBoard
 
 TOP = "robot"
 
 
 class Signal(NamedTuple):
-    """`place`: where the tap notes it (`tap.PLACES`), or a port of the CPU, whose pins have several sources."""
+    """`place`: where the tap notes it (`tap.PLACES`), a net by its number (`net0`), or a port of the CPU, whose pins
+    have several sources.
+    """
 
     name: str
     scope: str
@@ -43,6 +47,8 @@ class Signal(NamedTuple):
         """Where the levels that it follows from are noted."""
         if self.place in PLACES:
             return [PLACES.index(self.place)]
+        if self.place.startswith("net"):
+            return [len(PLACES) + int(self.place[3:])]
         port = int(self.place[4:])
         return [_LATCH + port, _OUTSIDE + port, *((_RXD, _TXD, _SHIFT) if port == 3 else ())]
 
@@ -85,6 +91,18 @@ SIGNALS = (
     *(Signal(f"p{port}_", "ports", 8, f"port{port}", f"pins of P{port}") for port in range(4)),
 )
 
+
+def net_signals(names: Sequence[str]) -> list[Signal]:
+    """The nets of a board of parts. A dot in a name would be a scope to viewers."""
+    signals: dict[str, Signal] = {}
+    for number, net in enumerate(names):
+        name = net.replace(".", "_")
+        while name in signals:
+            name += "_"
+        signals[name] = Signal(name, "nets", 1, f"net{number}", f"net {net}")
+    return list(signals.values())
+
+
 SETTLING_TICKS = 4096
 """After it begins to look on in mid-run, so long a level may still be on its way: encoder edges are reported up to a
 step of the plant (2048 ticks) late, and the CPU may be four cycles ahead."""
@@ -102,14 +120,16 @@ class Waveform:
     def __init__(
         self,
         out: IO[str],
-        board: Board | None = None,
+        board: ProcessorBoard | None = None,
         first_tick: int = 0,
         end_tick: int | None = None,
         tick_hz: int = TICKS_PER_SECOND,
     ) -> None:
         if end_tick is not None and end_tick <= first_tick:
             raise ValueError(f"ticks {first_tick} to {end_tick}: the window is empty")
-        self.signals = tuple(signal for signal in SIGNALS if board is not None or not signal.on_board)
+        robot = isinstance(board, Board)
+        nets = net_signals(board.nets.names) if isinstance(board, WiredBoard) else []
+        self.signals = (*(signal for signal in SIGNALS if robot or not signal.on_board), *nets)
         self.tap = CpuTap(board, self._flush)
         self.end_tick = end_tick
         self.tick_hz = tick_hz
@@ -124,7 +144,7 @@ class Waveform:
         self._places = [signal.places() for signal in self.signals]
         self._affected = [
             [index for index, places in enumerate(self._places) if place in places]
-            for place in range(len(PLACES))
+            for place in range(len(PLACES) + len(nets))
         ]
 
     def attach(self, cpu: Cpu) -> Waveform:
@@ -158,6 +178,7 @@ class Waveform:
             detach(self._cpu, self.tap)
             self._cpu = None
         if self.tap.begin_tick >= 0:
+            self.tap.take()
             self._flush()
             self.tap.detach()
         if self._writer is None:

@@ -52,6 +52,8 @@ cdef class Nets:
     @cython.locals(net=int, number=int, index=int, pin=int, port=int, part=Part)
     cpdef restart(self)
     cpdef watch(self, int net, int on)
+    @cython.locals(number=int, place=int, part=Part, pin=int)
+    cpdef list drivers(self, int net)
     @cython.locals(index=int, tick='long long')
     cpdef long long next_tick(self) except -1
     @cython.locals(index=int, tick='long long', part=Part)

@@ -54,7 +54,10 @@ class Device:
         return self.board.run(tick)
 
     def _run_asking(self, tick: int) -> int:
-        """Runs the board to `tick` in steps, and evaluates the predicates after each."""
+        """Runs the board to `tick` in steps, and evaluates the predicates after each, until one is true.
+
+        A wait ends there. More entries would, one an instruction, push that first one out of the log.
+        """
         board = self.board
         stopped = 0
         while not stopped and board.cpu.cycles * CYCLE_TICKS < tick:
@@ -67,6 +70,7 @@ class Device:
             for predicate, when in self.asked:
                 if (when == "instruction" or step_tick == sample_tick) and predicate(self):
                     board.log.note(TRUE, reached, 0, 0)
+                    return stopped or board.run_to_any(self.marks, tick)
         return stopped
 
     # Parts of a board

@@ -163,6 +163,13 @@ def test_a_predicate_is_asked_after_each_instruction_on_request():
     assert 0 < event.tick < PERIOD
 
 
+def test_a_predicate_that_stays_true_for_long_is_found_where_it_began():
+    first_cycle = 20_000  # thousands of instructions before the end of the piece: more than the log keeps
+    begun = wait.When(predicate=lambda robot: robot.board.cpu.cycles >= first_cycle, at="instruction")
+    event = fig6().run_until(begun, within=PERIOD)
+    assert 0 <= event.tick - 12 * first_cycle < 4 * 12
+
+
 def test_a_wait_in_vain_ends_on_the_tick_and_says_what_was_seen():
     world = fig6()
     with pytest.raises(WaitExpired, match=r"tick 100000: 100000 ticks passed without fault") as caught:

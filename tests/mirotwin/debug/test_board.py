@@ -1,0 +1,85 @@
+"""Parts and nets of a board in the debugger: printed, waited for, and as they were where it goes back."""
+
+import pytest
+
+from miro_exact.bad_input import BadInput
+from miro_protocol.actions import Put
+from miro_robot.image.debug_info import Sources
+from mirotwin.debug.board_values import names_on
+from mirotwin.debug.console import Console
+from mirotwin.debug.debugger import Debugger
+from mirotwin.debug.symbols import Symbols
+from mirotwin.debug.timeline import Timeline
+from mirotwin.runs.inspected_run import InspectedRun
+from tests.mirotwin.boards import CRYSTAL_HZ, world_of
+
+PRESSED_TICK = CRYSTAL_HZ // 4 + 7
+
+
+@pytest.fixture
+def console():
+    script = (Put(PRESSED_TICK, 0, 0, "key.pressed", True),)
+    run = InspectedRun(world_of(script, duration_ticks=CRYSTAL_HZ))
+    return Console(Debugger(Timeline(run), Symbols(run.image, Sources([]), names_on(run.device.board))))
+
+
+def said(console, line):
+    console.do(line)
+    return "\n".join(console.lines)
+
+
+def test_values_of_parts_nets_and_pins_are_printed(console):
+    said(console, "goto 500ms")
+    assert said(console, "print lamp.on") == "lamp.on = 1"
+    assert said(console, "print KEY") == "KEY = 0   (driven by key.pin)"
+    assert said(console, "print P3.2") == "P3.2 = 1   (the latch; on the pins is 0xfb)"
+    assert said(console, "print pins.P3.2") == "pins.P3.2 = 0"
+    assert said(console, "print nets.P1.0") == "nets.P1.0 = 0   (driven by P1.0)"
+    assert said(console, "print parts").split("\n") == [
+        "parts.key.pressed = 1",
+        "parts.key.closed = 1",
+        "parts.lamp.on = 1",
+        "parts.lamp.flashes = 1",
+    ]
+
+
+def test_until_stops_before_the_first_instruction_at_which_it_is_true_and_going_back_takes_the_parts_along(
+    console,
+):
+    assert "lamp.on == 1 is true" in said(console, "until lamp.on == 1")
+    tick = console.timeline.tick
+    assert PRESSED_TICK < tick < PRESSED_TICK + 12 * 12
+    console.do("stepi")
+    console.do("rstepi")
+    assert console.timeline.tick == tick
+    console.do("rstepi")
+    assert said(console, "print lamp.on") == "lamp.on = 0"
+    assert said(console, "print key.pressed") == "key.pressed = 1"
+    console.do("goto 1ms")
+    assert said(console, "print key.pressed") == "key.pressed = 0"
+    assert "lamp.on is true" in said(console, "until lamp.on")
+    assert console.timeline.tick == tick
+    assert "lamp.on is true here" in said(console, "until lamp.on")
+    assert "lamp.flashes > 1 is not true before the end" in said(console, "until lamp.flashes > 1")
+
+
+def test_a_breakpoint_may_ask_for_parts(console):
+    console.do("break 0x0b if lamp.on && key.pressed")
+    assert "breakpoint 1" in said(console, "continue")
+    assert console.timeline.tick > PRESSED_TICK
+
+
+@pytest.mark.parametrize(
+    ("line", "why"),
+    [
+        ("print lamp.off", "lamp has no member off; it has on, flashes"),
+        ("print lamq.on", "there is no lamq here; did you mean lamp?"),
+        ("until lamq.on", "there is no lamq; did you mean lamp?"),
+        ("until lamq", "is no condition and no name"),
+        ('until lamp.on == "yes"', "compares a text and a number"),
+    ],
+)
+def test_what_no_part_has_is_said_with_what_it_has(console, line, why):
+    with pytest.raises(BadInput) as error:
+        console.do(line)
+    assert why in str(error.value).replace("\n", " ")
