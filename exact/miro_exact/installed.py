@@ -25,6 +25,8 @@ PREFIX = "mirotwin."
 """Begins the names of all groups of entry points."""
 DIGITS = 12
 """Of a hash of sources."""
+in_files: dict[tuple[str, str], str] = {}
+"""Kind and name of a plug-in that the command line brought in a file, and what it was made of."""
 
 
 def entries_of(group: str, name: str | None = None) -> list[EntryPoint]:
@@ -80,17 +82,23 @@ def place(entry: EntryPoint) -> str:
 
 
 def described(kind: str, name: str) -> str:
-    """A plug-in (`kind`: law, estimator, reference, check) with version and hash of its sources, as they are now.
+    """A plug-in (`kind`: law, estimator, reference, check, part) with version and hash of its sources, as they are now.
 
     `law samson: samson-law 1.0, sources 0123456789ab`; "" for what no distribution registers: our own.
     """
+    if (kind, name) in in_files:
+        return f"{kind} {name}: {in_files[kind, name]}"
     entries = entries_of(f"{PREFIX}{kind}s", name)
     made = (f"{owner(entry)}, sources {sources_hash(entry)}" for entry in entries)
     return f"{kind} {name}: {' and '.join(made)}" if entries else ""
 
 
-described_once = cache(described)
-"""Like `described`, with the sources as this process first read them: later edits do not count."""
+_described_once = cache(described)
+
+
+def described_once(kind: str, name: str) -> str:
+    """Like `described`, with the sources as this process first read them: later edits do not count."""
+    return described(kind, name) if (kind, name) in in_files else _described_once(kind, name)
 
 
 def differences(

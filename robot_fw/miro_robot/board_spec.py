@@ -12,6 +12,8 @@ from miro_robot.parts.keys import PartKeys
 CRYSTAL_HZ = 24_000_000
 CRYSTAL_RANGE_HZ = (32_768, 100_000_000)
 XRAM_BYTES = 0x10000
+CHIPS = {"at89c51": False, "at89c52": False, "at89s52": False, "stc89c52": True}
+"""Chip, and whether it has RAM of its own for MOVX."""
 
 Address = Annotated[int, Meta(ge=0, le=0xFFFF)]
 Byte = Annotated[int, Meta(ge=0, le=0xFF)]
@@ -21,7 +23,7 @@ class StrapSpec(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_only
     """A jumper from the net `pin`, mostly a port pin, to VCC (level 1) or ground (0)."""
 
     pin: str
-    level: Literal[0, 1] = 1
+    level: Annotated[int, Meta(ge=0, le=1)] = 1
 
 
 class LatchSpec(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_only=True):

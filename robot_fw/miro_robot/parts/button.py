@@ -36,6 +36,10 @@ class Button(PartKeys, frozen=True, kw_only=True, tag="button"):
     rest: Literal["open", "closed"] = "open"
     bounce_ms: Annotated[float, Meta(ge=0.0, le=100.0)] = 0.0
 
+    @property
+    def pulled_up(self) -> tuple[str, ...]:
+        return ("pin",) if self.to == "vcc" else ()
+
     def make(self, place: Place) -> Part:
         return ButtonPart(self, place)
 

@@ -62,7 +62,7 @@ class PartKeys(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_only=
 
     @property
     def pulled_up(self) -> tuple[str, ...]:
-        """Pins that the part itself pulls up by a resistor: then nobody else need drive them high."""
+        """Pins that the part itself brings to VCC, as by a resistor: nobody else need drive them high."""
         return ()
 
     def make(self, place: Place) -> Part:

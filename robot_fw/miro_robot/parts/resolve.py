@@ -21,6 +21,9 @@ from miro_robot.parts.netlist import MOST_NETS, MOST_PARTS, PORT_PINS, Netlist, 
 
 MOST_LATCHES = MOST_BUFFERS = 8
 GROUND, VCC = "0", "1"
+_SUPPLIES = {"GND": GROUND, "GROUND": GROUND, "VSS": GROUND, "VCC": VCC, "VDD": VCC}
+LONGEST_WAY = 64
+"""From a pin to its net: so many pins."""
 NAME = re.compile(r"[A-Za-z_]\w{0,63}", re.ASCII)
 _PORT_PIN = re.compile(r"P[0-3]\.[0-7]")
 _PORT = re.compile(r"P[0-9]")
@@ -67,6 +70,9 @@ class _Resolver:
             name: {pin.name: number for number, pin in enumerate(part.keys.PINS)}
             for name, part in spec.parts.items()
         }
+        self.used = {
+            target.removeprefix("!"): None for part in spec.parts.values() for target in part.pins.values()
+        }  # words of the file
         self.check_counts()
         self.check_names()
         self.connect()
@@ -146,20 +152,15 @@ class _Resolver:
                 place, what = f"parts.{name}.pins.{pin}", f"{part.keys.name} has no such pin"
                 raise BoardError("", place, what, did_you_mean(pin, numbers, f"it has {', '.join(numbers)}"))
         for needed in part.keys.PINS:
-            if not needed.optional and needed.name not in part.pins and not self.is_named(name, needed.name):
+            if (
+                not needed.optional
+                and needed.name not in part.pins
+                and f"{name}.{needed.name}" not in self.used
+            ):
                 place = f"parts.{name}.pins"
                 raise BoardError(
                     "", place, f"pin {needed.name} is not connected", f'add {needed.name} = ".."'
                 )
-
-    def is_named(self, part: str, pin: str) -> bool:
-        """Whether another part is wired to this pin."""
-        word = f"{part}.{pin}"
-        return any(
-            target.removeprefix("!") == word
-            for other in self.spec.parts.values()
-            for target in other.pins.values()
-        )
 
     def target(self, text: str, place: str, way: tuple[tuple[str, str], ...] = ()) -> tuple[str, bool]:
         """The name of the net that a word of the file leads to, and whether by an inverter. `way`: the pins so far."""
@@ -175,6 +176,8 @@ class _Resolver:
                 other = VCC if word == GROUND else GROUND
                 raise BoardError("", place, f"{text!r} is a constant", f'write "{other}"')
             return word, False
+        if word.upper() in _SUPPLIES and word not in self.spec.nets:
+            raise BoardError("", place, f"{word} is no net", f'write "{_SUPPLIES[word.upper()]}"')
         if owner in self.spec.latches and dot:
             if len(pin) != 1 or pin not in _BITS:
                 raise BoardError(
@@ -217,6 +220,8 @@ class _Resolver:
         if (owner, pin) in way:
             ring = " and ".join(f"{part}.{name}" for part, name in way)
             raise BoardError("", place, f"{ring} name each other", "leave one of them out")
+        if len(way) >= LONGEST_WAY:
+            raise BoardError("", place, f"leads over {len(way)} pins", "give the net a name")
         text = self.spec.parts[owner].pins.get(pin)
         if text is None:
             wire = self.wire(f"{owner}.{pin}", place)

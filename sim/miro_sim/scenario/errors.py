@@ -85,11 +85,12 @@ def value_error(origin: str, raw: dict[str, Any], message: str) -> ScenarioError
         remedy = f"must be {limit[2]}{_unit_of(path)}"
         return ScenarioError(origin, path, f"{limit[3]} is out of range", remedy)
     what, _, remedy = what.partition("; ")
-    value = _value_at(raw, path)
-    return ScenarioError(origin, path, *_explain(what, path, value, remedy or _choices_at(raw, path)))
+    value = value_at(raw, path)
+    return ScenarioError(origin, path, *explained(what, path, value, remedy or _choices_at(raw, path)))
 
 
-def _explain(what: str, path: str, value: Any, remedy: str) -> tuple[str, str]:
+def explained(what: str, path: str, value: Any, remedy: str) -> tuple[str, str]:
+    """What is wrong with a value, and the remedy: what msgspec found at a key path, in the words of the file."""
     wrong_type = re.fullmatch(r"Expected `([\w |]+)`, got `(\w+)`", what)
     if wrong_type:
         want = " or ".join(
@@ -160,7 +161,7 @@ def _quoted_number(want: str, value: Any) -> str:
     return "write the number without quotes; the unit stands in the key" if number else ""
 
 
-def _value_at(raw: Any, path: str) -> Any:
+def value_at(raw: Any, path: str) -> Any:
     """What stands at a key path like `network[0].radio.keyup_s`, or None."""
     for key, index in re.findall(r"([^.\[\]]+)|\[(\d+)\]", path):
         try:
@@ -181,7 +182,7 @@ def _type_at(raw: Any, path: str) -> msgspec.inspect.Type | None:
     found = _type_of(Scenario)
     for key, index in re.findall(r"([^.\[\]]+)|\[(\d+)\]", path):
         found = _chosen(found, raw)
-        raw = _value_at(raw, key or f"[{index}]")
+        raw = value_at(raw, key or f"[{index}]")
         if key and isinstance(found, msgspec.inspect.StructType):
             fields = {field.encode_name: field.type for field in found.fields}
             if key not in fields:
@@ -214,7 +215,7 @@ def _structs_at(raw: Any, path: str) -> list[msgspec.inspect.StructType]:
     """The kinds of table that there may be at a key path: several where a key says which."""
     found = _type_at(raw, path)
     if found is not None:
-        found = _chosen(found, _value_at(raw, path))
+        found = _chosen(found, value_at(raw, path))
     return [option for option in _options(found) if isinstance(option, msgspec.inspect.StructType)]
 
 
@@ -224,7 +225,7 @@ def _options(found: msgspec.inspect.Type | None) -> tuple[msgspec.inspect.Type |
 
 def _keys_at(raw: Any, path: str) -> list[str]:
     """The keys of the table at a key path, which has chosen its kind."""
-    value = _value_at(raw, path)
+    value = value_at(raw, path)
     for struct in _structs_at(raw, path):
         tag = struct.tag_field
         if tag is None or value.get(tag, struct.tag) == struct.tag:

@@ -10,8 +10,15 @@ from miro_exact.installed import described
 from miro_exact.plugins import PluginError, Registry
 from miro_exact.raised import raised
 from miro_host.registries import ESTIMATORS, LAWS, REFERENCES, AnyEstimator, AnyReference, Controller
+from miro_robot.parts.keys import PartKeys
+from miro_sim.scenario.parts import PARTS
 
-REGISTRIES: dict[type, Registry[Any]] = {AnyReference: REFERENCES, AnyEstimator: ESTIMATORS, Controller: LAWS}
+REGISTRIES: dict[type, Registry[Any]] = {
+    AnyReference: REFERENCES,
+    AnyEstimator: ESTIMATORS,
+    Controller: LAWS,
+    PartKeys: PARTS,
+}
 """By the type that a field of the scenario has."""
 
 
