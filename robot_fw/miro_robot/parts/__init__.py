@@ -3,7 +3,11 @@
 ELECTRONICS = {
     "button": "miro_robot.parts.button:Button",
     "buzzer": "miro_robot.parts.buzzer:Buzzer",
+    "hc_sr04": "miro_robot.parts.hc_sr04:HcSr04",
+    "l293d": "miro_robot.parts.l298:L293d",
+    "l298": "miro_robot.parts.l298:L298",
     "led": "miro_robot.parts.led:Led",
     "lm629": "miro_robot.parts.lm629:Lm629Keys",
+    "servo": "miro_robot.parts.servo:Servo",
 }
 """Name to the struct of its keys. Parts that move are the physical world's."""

@@ -11,7 +11,7 @@ from typing import Annotated, Any, Literal
 from msgspec import Meta
 
 from miro_exact.state import FLAG, TICK
-from miro_robot.parts.keys import HIGH, LOW, OPEN_DRAIN, RELEASED, PartKeys, Pin, Place
+from miro_robot.parts.keys import HIGH, LOW, RELEASED, STRONG, PartKeys, Pin, Place
 from miro_robot.parts.part import Part
 
 _NEVER = 1 << 62
@@ -25,7 +25,7 @@ class Button(PartKeys, frozen=True, kw_only=True, tag="button"):
     the button's name and the number of the change only; 0: never. A switch is a button that is left pressed.
     """
 
-    PINS = (Pin("pin", OPEN_DRAIN),)
+    PINS = (Pin("pin", STRONG),)
     PUTS = {"pressed": bool}
     READS = {"pressed": "whether it is pressed", "closed": "whether its contact is closed"}
     SHEET = (

@@ -1,6 +1,5 @@
 """Parts on nets without a processor: a test drives nets and looks at them, at ticks that it names."""
 
-from miro_exact.clock import NEVER_TICK
 from miro_exact.rng import Stream
 from miro_exact.state import Flat
 from miro_robot.parts.keys import RELEASED, STRONG, PartKeys, Pin, Place
@@ -23,15 +22,34 @@ class HandPart(Part):
         self.drive(0, value)
 
 
+class Probe(PartKeys, frozen=True, kw_only=True, tag="probe"):
+    """Keeps the edges of a net."""
+
+    PINS = (Pin("in"),)
+
+    def make(self, place):
+        return ProbePart(self, place)
+
+
+class ProbePart(Part):
+    def __init__(self, keys, place):
+        Part.__init__(self, keys, place)
+        self.edges = []
+
+    def changed(self, pins, tick):
+        self.edges.append((tick, self.level(0)))
+
+
 class Bench:
-    """`parts`: name -> (keys, {pin: net}). Every net that `drives` names is driven by the test, else it is released."""
+    """`parts`: name -> (keys, {pin: net}). Nets that `drives` names are driven by the test, all are looked at."""
 
     STATE = {"parts": [Part]}
 
     def __init__(self, parts, drives=(), crystal_hz=12_000_000, seed=0):
+        nets = sorted({net for _, pins in parts.values() for net in pins.values()})
         wanted = {**parts, **{f"~{net}": (Hand(), {"out": net}) for net in drives}}
+        wanted |= {f"?{net}": (Probe(), {"in": net}) for net in nets}
         self.order = sorted(wanted)
-        nets = sorted({net for _, pins in wanted.values() for net in pins.values()})
         self.number = {net: index for index, net in enumerate(nets)}
         self.parts = []
         for name in self.order:
@@ -57,9 +75,6 @@ class Bench:
             for name in self.order
         )
         self.nets = Nets(Netlist(names=tuple(nets), parts=wires), self.parts)
-        self.edges = self.nets.edges = []
-        for net in range(len(nets)):
-            self.nets.watch(net, 1)
         self.tick = 0
         self._supply(1)
 
@@ -76,7 +91,7 @@ class Bench:
 
     def run(self, tick):
         """Does what happens before `tick`."""
-        while (due := self.nets.next_tick()) < tick and due < NEVER_TICK:
+        while (due := min(part.next_tick for part in self.parts)) < tick:
             self.nets.due(due)
         self.tick = tick
 
@@ -85,11 +100,23 @@ class Bench:
         self.run(self.tick if tick is None else tick)
         name, key = path.split(".", 1)
         self.named[name].put(key, value, self.tick)
-        self.nets.call(self.order.index(name), self.tick)
+        self.nets.collect(self.order.index(name), self.tick)
+        self.nets.settle(self.tick)
 
     def drive(self, net, level, tick=None):
         """Drives a net from a tick on; None lets it go."""
-        self.put(f"~{net}.out", RELEASED if level is None else level, tick)
+        self.drive_all({net: level}, tick)
+
+    def drive_all(self, levels, tick=None):
+        """The same for several nets at once, as the processor does it: after the events of that tick."""
+        tick = self.tick if tick is None else tick
+        self.run(tick + 1)
+        self.tick = tick
+        for net, level in levels.items():
+            hand = self.order.index(f"~{net}")
+            self.parts[hand].put("out", RELEASED if level is None else level, self.tick)
+            self.nets.collect(hand, self.tick)
+        self.nets.settle(self.tick)
 
     def read(self, path):
         name, key = path.split(".", 1)
@@ -99,9 +126,13 @@ class Bench:
     def level(self, net):
         return self.nets.levels[self.number[net]]
 
+    def driven(self, net):
+        """The level that somebody drives a net to, None while it floats."""
+        return self.level(net) if self.named[f"?{net}"].driven & 1 else None
+
     def edges_of(self, net):
         """(tick, level) of every change of a net so far."""
-        return [(tick, level) for tick, number, level in self.edges if number == self.number[net]]
+        return self.named[f"?{net}"].edges
 
     def save(self):
         return Flat(self).save()

@@ -33,8 +33,9 @@ def test_a_normally_closed_one_opens():
 def test_one_to_vcc_drives_its_net_high():
     board = Bench({"key": (Button(to="vcc"), {"pin": "net"})})
     board.put("key.pressed", True, 5)
-    assert board.level("net") == 1
-    assert board.named["key"].drives[0] == 1
+    assert board.driven("net") == 1
+    board.put("key.pressed", False, 9)
+    assert board.driven("net") is None
 
 
 def test_a_contact_needs_no_supply():
