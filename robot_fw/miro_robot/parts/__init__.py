@@ -1,11 +1,14 @@
 """Parts that a board may have beside its processor: electronics, one file a part."""
 
 ELECTRONICS = {
+    "at24c": "miro_robot.parts.at24c:At24c",
     "button": "miro_robot.parts.button:Button",
     "buzzer": "miro_robot.parts.buzzer:Buzzer",
     "hc_sr04": "miro_robot.parts.hc_sr04:HcSr04",
     "l293d": "miro_robot.parts.l298:L293d",
     "l298": "miro_robot.parts.l298:L298",
+    "lcd1602": "miro_robot.parts.lcd1602:Lcd1602",
+    "lcd2004": "miro_robot.parts.lcd1602:Lcd2004",
     "led": "miro_robot.parts.led:Led",
     "lm629": "miro_robot.parts.lm629:Lm629Keys",
     "servo": "miro_robot.parts.servo:Servo",
