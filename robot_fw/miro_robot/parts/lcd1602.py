@@ -10,10 +10,10 @@
     E   ──┘     └─────────┘     └────       four wires: the upper half of a byte, then the lower one
     D7..D4  7..4            3..0            busy after the last fall: 37 us, clear and home 1.52 ms
 
-A byte that is written while it is busy is lost and counted in `lost`; its halves count all the same. A pulse that breaks
-the bus timing is counted in `short_pulses` and taken all the same; of signals that change on the tick on which E falls,
-what they were before. From a processor of 12 ticks a cycle E is never too short below 52 MHz: what is left is RS, R/W or
-data that are written by the same instruction as E.
+A byte that is written while it is busy is lost and counted in `lost`; its halves count all the same. A pulse that
+breaks the bus timing is counted in `short_pulses` and taken all the same; of signals that change on the tick on which E
+falls, what they were before. From a processor of 12 ticks a cycle E is never too short below 52 MHz: what is left is
+RS, R/W or data that are written by the same instruction as E.
 """
 
 from __future__ import annotations
@@ -24,7 +24,7 @@ from msgspec import Meta
 
 from miro_exact.clock import NEVER_TICK
 from miro_exact.state import FLAG, TICK
-from miro_robot.parts.keys import IN, RELEASED, STRONG, PartKeys, Pin, Place
+from miro_robot.parts.keys import IN, RELEASED, TWO_WAY, PartKeys, Pin, Place
 from miro_robot.parts.part import Part
 
 _RS, _SELECT, _RW, _E, _DATA = 0b1, 0b11, 0b10, 0b100, 0xFF << 3
@@ -58,7 +58,7 @@ class Lcd1602(PartKeys, frozen=True, kw_only=True, tag="lcd1602"):
         Pin("rs"),
         Pin("rw", IN, optional=True, level=0),
         Pin("e"),
-        *(Pin(f"d{bit}", STRONG, optional=bit < 4) for bit in range(8)),
+        *(Pin(f"d{bit}", TWO_WAY, optional=bit < 4) for bit in range(8)),
     )
     READS = {
         "text": "all rows as they are shown, spaces kept, with line ends between them",
@@ -80,6 +80,11 @@ class Lcd1602(PartKeys, frozen=True, kw_only=True, tag="lcd1602"):
     def __post_init__(self) -> None:
         if self.rows * self.columns > 80:
             raise ValueError(f"{self.rows} rows of {self.columns}: an HD44780 has 80 characters")
+
+    @property
+    def pulled_up(self) -> tuple[str, ...]:
+        """All but E (I/O pin configuration)."""
+        return tuple(pin.name for pin in self.PINS if pin.name != "e")
 
     def make(self, place: Place) -> Part:
         return Lcd1602Part(self, place)
@@ -119,7 +124,7 @@ class Lcd1602Part(Part):
     }
     NOT_STATE = (
         *("rows", "columns", "reset_ticks", "short_ticks", "long_ticks", "count_ticks"),
-        *("width_ticks", "cycle_ticks", "select_ticks", "hold_ticks"),
+        *("width_ticks", "cycle_ticks", "select_ticks", "data_ticks"),
     )
 
     def __init__(self, keys: Lcd1602, place: Place) -> None:
@@ -132,7 +137,7 @@ class Lcd1602Part(Part):
         self.width_ticks = -(-_WIDTH_NS * self.crystal_hz // 1_000_000_000)  # rounded up
         self.cycle_ticks = -(-_CYCLE_NS * self.crystal_hz // 1_000_000_000)
         self.select_ticks = -(-_SELECT_NS * self.crystal_hz // 1_000_000_000)
-        self.hold_ticks = -(-_DATA_NS * self.crystal_hz // 1_000_000_000)
+        self.data_ticks = -(-_DATA_NS * self.crystal_hz // 1_000_000_000)
         self.powered = 0
         self.entry = self.display = self.function = 0
         self.in_cgram = self.address = self.old_address = self.shift = 0
@@ -153,6 +158,7 @@ class Lcd1602Part(Part):
         self.data = self.half = 0
         self.busy_tick = tick + self.reset_ticks
         self.count_tick = 0
+        self.rise_tick = _NEVER  # ports are high from power-on on: that E falls then is no pulse
         self._answer(tick)
 
     def supply(self, on: int, tick: int) -> None:
@@ -214,11 +220,12 @@ class Lcd1602Part(Part):
 
     def _fell(self, pins: int, tick: int) -> None:
         """E falls: a byte, or half of one, has come or gone."""
+        if self.rise_tick == _NEVER:
+            self.rise_tick = 0
+            return
         before = self.levels ^ pins
         is_read = before & _RW
-        late = pins & _SELECT
-        if not is_read:
-            late |= pins & _DATA or tick - self.data_tick < self.hold_ticks
+        late = not is_read and (pins & (_SELECT | _DATA) or tick - self.data_tick < self.data_ticks)
         if late or tick - self.rise_tick < self.width_ticks:
             self.short_pulses += 1
         byte = before >> _D0 & 0xFF

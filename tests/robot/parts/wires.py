@@ -1,0 +1,196 @@
+"""Masters that tests move by hand: a port that puts several pins on one tick, a display's bus, an I2C bus."""
+
+from miro_robot.parts.keys import HIGH, LOW, RELEASED, STRONG, PartKeys, Pin
+from miro_robot.parts.part import Part
+from tests.robot.parts.bench import Bench
+
+HZ = 12_000_000
+US = 12
+MS = 12_000
+DATA = [f"d{bit}" for bit in range(8)]
+
+
+class Port(PartKeys, frozen=True, kw_only=True, tag="port"):
+    """Drives many nets at once."""
+
+    PINS = tuple(Pin(f"p{number}", STRONG) for number in range(12))
+
+    def make(self, place):
+        return PortPart(self, place)
+
+
+class PortPart(Part):
+    def put(self, name, value, tick):
+        for pin, level in value.items():
+            self.drive(pin, level)
+
+
+class Wires(Bench):
+    """One part named `chip`, and a port with a pin at each of `nets`."""
+
+    def __init__(self, keys, pins, nets, **named):
+        self.nets_of_port = {net: number for number, net in enumerate(nets)}
+        parts = {
+            "chip": (keys, pins),
+            "port": (Port(), {f"p{n}": net for net, n in self.nets_of_port.items()}),
+        }
+        super().__init__(parts, crystal_hz=HZ, **named)
+
+    def set(self, tick=None, **levels):
+        """Puts levels of nets on one tick; None lets go."""
+        driven = {
+            self.nets_of_port[net]: RELEASED if level is None else HIGH if level else LOW
+            for net, level in levels.items()
+        }
+        self.put("port.levels", driven, tick)
+
+    def later(self, ticks):
+        """Lets time pass."""
+        self.run(self.tick + ticks)
+
+    def value(self, key):
+        return self.read(f"chip.{key}")
+
+
+class LcdBus(Wires):
+    """A display, and a program that talks to it over all its pins or over four wires."""
+
+    def __init__(self, keys, wires=8, reading=True, **named):
+        self.data = DATA[8 - wires :]
+        nets = ["rs", "e", *self.data] + ["rw"] * reading
+        super().__init__(keys, {net: net for net in nets}, nets, **named)
+        self.later(US)
+        self.set(e=0)
+        self.later(US)
+        self.set(rs=0, **dict.fromkeys(self.data, 0), **({"rw": 0} if reading else {}))
+
+    def pulse(self, value, rs=0):
+        """Puts a byte, or half of one, on the data wires, and E high for a microsecond."""
+        bits = 8 - len(self.data)
+        self.set(rs=rs, **{net: value >> (index + bits) & 1 for index, net in enumerate(self.data)})
+        self.later(US)
+        self.set(e=1)
+        self.later(US)
+        self.set(e=0)
+        self.later(US)
+
+    def write(self, value, rs=0, wait=50 * US):
+        """A byte: at once or in two halves."""
+        self.pulse(value, rs)
+        if len(self.data) == 4:
+            self.pulse(value << 4, rs)
+        self.later(wait)
+
+    def command(self, *values):
+        for value in values:
+            self.write(value, wait=2 * MS if value < 4 else 50 * US)
+
+    def print(self, text):
+        for character in text:
+            self.write(ord(character), 1)
+
+    def half(self, rs):
+        """What the data wires show while E is high."""
+        self.set(rs=rs, rw=1, **dict.fromkeys(self.data))
+        self.later(US)
+        self.set(e=1)
+        self.later(US)
+        bits = 8 - len(self.data)
+        value = sum(self.level(net) << (index + bits) for index, net in enumerate(self.data))
+        self.set(e=0)
+        self.later(US)
+        self.set(rw=0)
+        return value
+
+    def get(self, rs=0):
+        """A byte that is read: busy flag and address, or data."""
+        value = self.half(rs)
+        if len(self.data) == 4:
+            value |= self.half(rs) >> 4
+        return value
+
+    def begin(self, lines=2):
+        """Initializes it by instruction, shows it without a cursor and clears it."""
+        self.later(15 * MS)
+        for wait in (5 * MS, 200 * US, 50 * US):
+            self.pulse(0x30)
+            self.later(wait)
+        if len(self.data) == 4:
+            self.pulse(0x20)
+            self.later(50 * US)
+        wide = 0x10 if len(self.data) == 8 else 0
+        self.command(0x20 | wide | (8 if lines == 2 else 0), 0x0C, 0x01, 0x06)
+        return self
+
+
+class I2cBus(Wires):
+    """A target at SCL and SDA, and a master that is moved bit by bit."""
+
+    def __init__(self, keys, half=5 * US, pins=(), **named):
+        self.half = half
+        wired = {"scl": "scl", "sda": "sda", **{pin: pin for pin in pins}}
+        super().__init__(keys, wired, ["scl", "sda", *pins], **named)
+        self.later(self.half)
+
+    def wire(self, **levels):
+        """An open drain: a 1 lets go."""
+        self.set(**{net: None if level else 0 for net, level in levels.items()})
+        self.later(self.half)
+
+    def start(self):
+        self.wire(sda=1)
+        self.wire(scl=1)
+        self.wire(sda=0)
+        self.wire(scl=0)
+
+    def stop(self):
+        self.wire(sda=0)
+        self.wire(scl=1)
+        self.wire(sda=1)
+
+    def bit(self, level=1):
+        self.wire(sda=level)
+        self.set(scl=None)
+        while not self.level("scl"):  # the target stretches the clock
+            self.later(US)
+        self.later(self.half)
+        seen = self.level("sda")
+        self.wire(scl=0)
+        return seen
+
+    def send(self, *values):
+        """Whether each byte was acknowledged."""
+        acks = []
+        for value in values:
+            for index in range(7, -1, -1):
+                self.bit(value >> index & 1)
+            acks.append(not self.bit())
+        return acks
+
+    def receive(self, count):
+        """Bytes that are read, the last one without acknowledge."""
+        values = []
+        for number in range(count):
+            value = 0
+            for _ in range(8):
+                value = value << 1 | self.bit()
+            self.bit(number == count - 1)
+            values.append(value)
+        return values
+
+    def write(self, *values):
+        """Start, bytes, stop; whether all were acknowledged."""
+        self.start()
+        acks = self.send(*values)
+        self.stop()
+        return all(acks)
+
+    def read_from(self, address, *word, count):
+        """The bytes from a word address on."""
+        self.start()
+        assert all(self.send(address, *word))
+        self.start()
+        assert all(self.send(address | 1))
+        values = self.receive(count)
+        self.stop()
+        return values
