@@ -18,7 +18,7 @@ from miro_exact.bad_input import BadInput
 from miro_exact.clock import TICKS_PER_SECOND
 from miro_exact.installed import described_once
 from miro_sim.periods import Period
-from miro_sim.scenario.file import ScenarioText
+from miro_sim.scenario.board_scenario import AnyText
 from miro_sim.scenario.plugins import plugins_used
 from mirotwin.recording import channels
 from mirotwin.recording.channels import FaultMessage, ImageMessage, TheoryMessage
@@ -72,7 +72,7 @@ class RunSource(msgspec.Struct, frozen=True):
     bit_ticks: int = 0
 
 
-def source_of(text: ScenarioText, world: World, record: str = "default", resumed: bytes = b"") -> RunSource:
+def source_of(text: AnyText, world: World, record: str = "default", resumed: bytes = b"") -> RunSource:
     """The sources of a run of `world`, which is made of `text`."""
     image = world.image
     return RunSource(

@@ -11,14 +11,16 @@ from typing import TYPE_CHECKING
 import click
 
 from miro_exact.bad_input import BadInput
-from miro_sim.scenario.file import load
+from miro_exact.clock import TICKS_PER_SECOND
+from miro_sim.scenario.board_scenario import BoardText, load_any
 from mirotwin.recording.recorder import source_of
-from mirotwin.run.run_files import RunFiles, Stops, digest_in
+from mirotwin.run.run_files import AnySummary, RunFiles, Stops, digest_in
 from mirotwin.run.run_options import RunOptions
 from mirotwin.runs.run import Run
 from mirotwin.runs.spec import RunSpec
+from mirotwin.runs.summary import Summary
 from mirotwin.shell.command import command_of
-from mirotwin.shell.firmware_image import load_firmware
+from mirotwin.shell.firmware_image import image_for
 from mirotwin.shell.held_signals import held_signals
 from mirotwin.shell.options import plain_parameters
 from mirotwin.shell.outputs import FILES, OutputFolder
@@ -29,12 +31,17 @@ from mirotwin.verify.expectations import as_settings
 from mirotwin.verify.steps.reading import steps_in
 
 if TYPE_CHECKING:
+    from rich.table import Table
+
     from mirotwin.camera.view import View
 
 
 @command_of(RunOptions)
 def run(options: RunOptions) -> int:
     """Runs SCENARIO (a built-in name, or a .toml file) and writes run.mcap, figure.svg and summary.json.
+
+    SCENARIO may be a board, too: the scenario of a board (`board = "car.board.toml"` in it), or a board file with
+    --firmware and --for. What its parts measure and show is in the recording, and at the end in the table.
 
     A run that is broken off (Ctrl-C, a full disk, an error) leaves run.part.mcap and summary.part.json instead, with
     all that was recorded; one that is killed leaves run.part.mcap with all but the last half second. decode, export
@@ -56,12 +63,17 @@ def run(options: RunOptions) -> int:
     not.
     """
     seed, record = options.seed, options.record
-    text = load(options.scenario, (*options.settings, *as_settings(options.expected)))
+    text = load_any(
+        options.scenario, (*options.settings, *_duration(options), *as_settings(options.expected))
+    )
+    alone = isinstance(text, BoardText)
+    if alone and (given := options.given("frames", "record_frames", "record")):
+        raise click.UsageError(f"{given[0]} is for robots, and {options.scenario} is for a board.")
     expected, steps = expectations_in(text), steps_in(text)
     tell_notes(text.notes)
     if steps and record == "full":
         raise click.UsageError(f"--record full does not go with the steps of {options.scenario}.")
-    stops = Stops(options.save_at, options.to_time, options.resume)
+    stops = Stops(options.save_at, options.to_time, options.resume, text.scenario.clock)
     if stops and (steps or record == "full"):
         other = f"the steps of {options.scenario}" if steps else "--record full"
         raise click.UsageError(f"--save-at, --resume and --to do not go with {other}.")
@@ -70,7 +82,7 @@ def run(options: RunOptions) -> int:
         options.out or default, options.force, (*FILES, *stops.names), ours=options.out is None
     )
     earlier = "" if options.out is not None else digest_in(folder.path)
-    image = load_firmware(options.firmware, stack_from=options.stack_from)
+    image = image_for(text, options.firmware, options.stack_from)
 
     spec = RunSpec(
         scenario=text.scenario,
@@ -115,14 +127,33 @@ def run(options: RunOptions) -> int:
         note = f"{folder.path} held a run with other bits (digest {earlier[:12]}..), now replaced"
         tell_notes([f"{note}; --out keeps both"])
     if not options.quiet:
-        from mirotwin.run.run_table import table_of  # loads rich
         from mirotwin.shell.console import show
 
-        show(table_of(summary, run_files.tracks, folder.path))
+        show(_table(summary, run_files, folder.path))
     result = under_way.result()
     complain(*result.texts)
     under_way.keep_saved(folder.path)
     return result.code
+
+
+def _duration(options: RunOptions) -> tuple[str, ...]:
+    """The setting of --for."""
+    time = options.for_time
+    if time is None:
+        return ()
+    clock = TICKS_PER_SECOND
+    if time.in_ticks:  # of the crystal, which the scenario says
+        clock = load_any(options.scenario, (*options.settings, "duration_s=1")).scenario.clock
+    return (f"duration_s={time.seconds(clock)!r}",)
+
+
+def _table(summary: AnySummary, run_files: RunFiles, folder: Path) -> Table:
+    from mirotwin.run.board_table import board_table  # load rich
+    from mirotwin.run.run_table import table_of
+
+    if isinstance(summary, Summary):
+        return table_of(summary, run_files.tracks, folder)
+    return board_table(summary, run_files.serial, f"{run_files.run.world.image.path}", folder)
 
 
 @contextmanager

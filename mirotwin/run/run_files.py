@@ -16,17 +16,20 @@ from contextlib import suppress
 from dataclasses import dataclass, field
 from functools import partial
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import msgspec
 from msgspec.structs import replace
 
 from miro_exact.bad_input import BadInput, amount
+from miro_exact.clock import TICKS_PER_SECOND
 from miro_exact.inputs import WORLD_BYTES, read_input
 from miro_sim.periods import Period
+from miro_sim.scenario.board import BoardScenario
 from miro_sim.world.world import World
 from mirotwin.recording.recorder import Recorder, RunSource
 from mirotwin.recording.track import Tracks
+from mirotwin.runs.board_summary import BoardSummary, SerialCounts, summarise_board
 from mirotwin.runs.learnt import learnt_calibrations, learnt_wheels
 from mirotwin.runs.run import Run
 from mirotwin.runs.summary import LiveFigures, StepResults, Summary, summarise, to_json
@@ -40,6 +43,7 @@ if TYPE_CHECKING:
     from mirotwin.camera.view import View
     from mirotwin.verify.steps.player import Player
 
+AnySummary = Summary | BoardSummary
 SUMMARY = "summary.json"
 FIGURE = "figure.svg"
 WORLD_SUFFIX = ".world"
@@ -51,9 +55,15 @@ class Stops:
     Raises BadInput for ticks that the run does not come past.
     """
 
-    def __init__(self, save_at: Sequence[Time], to_tick: Time | None, resume: str | None = None) -> None:
-        self.save_ticks = sorted({time.ticks() for time in save_at})
-        self.to_tick = None if to_tick is None else to_tick.ticks()
+    def __init__(
+        self,
+        save_at: Sequence[Time],
+        to_tick: Time | None,
+        resume: str | None = None,
+        crystal_hz: int = TICKS_PER_SECOND,
+    ) -> None:
+        self.save_ticks = sorted({time.ticks(crystal_hz) for time in save_at})
+        self.to_tick = None if to_tick is None else to_tick.ticks(crystal_hz)
         self.resume = resume
         self.resumed = b""
         self.begin_tick = 0
@@ -88,8 +98,9 @@ class Stops:
             requested.insert(0, ("--to", to_tick, end_tick))
         for option, tick, last in requested:
             if not world.tick < tick <= last:
-                reason = f"the run goes from {at(world.tick)} to {at(last)}"
-                raise BadInput("", f"{option} {tick}t ({in_ms(tick)})", reason, "give a time between")
+                reason = f"the run goes from {at(world.tick, world.clock)} to {at(last, world.clock)}"
+                place = f"{option} {tick}t ({in_ms(tick, world.clock)})"
+                raise BadInput("", place, reason, "give a time between")
 
     def move(self, world: World, folder: OutputFolder) -> None:
         """Runs the world to its end, or to `to_tick`."""
@@ -121,10 +132,11 @@ class RunFiles:
     live: Callable[[], LiveFigures] | None = None
     stops: Stops | None = None
     tracks: Tracks = field(default_factory=Tracks, init=False)
+    serial: SerialCounts = field(default_factory=SerialCounts, init=False)
     broken_off: str = field(default="", init=False)
     _wall_s: float = field(default=0.0, init=False)
 
-    def fill(self, bar: ProgressBar, hold: Hold, title: str | None) -> Summary:
+    def fill(self, bar: ProgressBar, hold: Hold, title: str | None) -> AnySummary:
         """The whole run; returns its summary. Whatever it raises, parts of the recording and the summary are left.
 
         `hold` holds signals. `title` None: no figure.
@@ -134,7 +146,7 @@ class RunFiles:
             self.run.finish()
             summary = self._summary(complete=True)
             self.folder.part(SUMMARY).write_bytes(to_json(summary))
-            if self.tracks.count and title is not None:
+            if self.tracks.robots and title is not None:
                 from mirotwin.report.figure import draw
 
                 scenario, seed = self.source.scenario_name, self.source.seed
@@ -150,8 +162,11 @@ class RunFiles:
                 view.shows.append(partial(_keep_frame, recorder))
 
         def progress(period: Period) -> None:
+            if alone:
+                self.serial.add(period)
             bar.to(self.tracks.count)
 
+        alone = isinstance(self.run.world.scenario, BoardScenario)
         began_s = time.perf_counter()
         try:
             with self.folder.part(RECORDING).open("wb", buffering=0) as stream, bar:
@@ -159,19 +174,24 @@ class RunFiles:
         finally:
             self._wall_s = time.perf_counter() - began_s
 
-    def _summary(self, complete: bool, reason: str = "") -> Summary:
+    def _summary(self, complete: bool, reason: str = "") -> AnySummary:
         begin_tick = 0 if self.stops is None else self.stops.begin_tick
         world, player = self.run.world, self.run.player
+        every: dict[str, Any] = {
+            "complete": complete,
+            "reason": reason,
+            "set": self.settings,
+            "expectations": self.run.checks.verdicts(),
+            "steps": None if player is None else self._steps(player),
+            "live": None if self.live is None else self.live(),
+        }
+        if isinstance(world.scenario, BoardScenario):
+            return replace(summarise_board(world, self.serial, self._wall_s, begin_tick), **every)
         return replace(
             summarise(world, self.tracks, self._wall_s, begin_tick),
-            complete=complete,
-            reason=reason,
-            set=self.settings,
             calibrations=learnt_calibrations(world.networks),
             wheels=learnt_wheels(world.networks),
-            expectations=self.run.checks.verdicts(),
-            steps=None if player is None else self._steps(player),
-            live=None if self.live is None else self.live(),
+            **every,
         )
 
     def _steps(self, player: Player) -> StepResults:
@@ -199,9 +219,15 @@ def _keep_frame(recorder: Recorder, view: View) -> None:
     recorder.write_image(view.network, view.tick, view.png(plain=True))
 
 
+class _Digest(msgspec.Struct):
+    """What any summary has."""
+
+    digest: str
+
+
 def digest_in(folder: Path) -> str:
     """The digest in the summary of an earlier run; "" where there is none that can be read."""
     try:
-        return msgspec.json.decode(read_input(folder / SUMMARY), type=Summary).digest
+        return msgspec.json.decode(read_input(folder / SUMMARY), type=_Digest).digest
     except (BadInput, OSError, msgspec.DecodeError):
         return ""

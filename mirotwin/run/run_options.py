@@ -7,6 +7,7 @@ from typing import Annotated, Literal
 
 import click
 
+from miro_sim.scenario.file import LONGEST_S
 from mirotwin.shell.command import Option, Options
 from mirotwin.shell.options import (
     FORCE,
@@ -68,6 +69,14 @@ class RunOptions(Options, frozen=True, kw_only=True):
             help="Save the world there as at-TICK.world, such as 1.5s, 20ms or 48000t; may be repeated.",
         ),
     ] = ()
+    for_time: Annotated[
+        Time | None,
+        Option(
+            "--for",
+            type=TimeType(positive=True, longest_s=LONGEST_S),
+            help="How long to run, such as 2s: instead of the scenario's duration_s.",
+        ),
+    ] = None
     to_time: Annotated[Time | None, TO.saying("End the run there.")] = None
     resume: Annotated[str | None, RESUME] = None
     force: Annotated[bool, FORCE.saying("Replace the files of an earlier run in the folders.")] = False

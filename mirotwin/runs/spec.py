@@ -18,7 +18,7 @@ from miro_sim.scenario.board import BoardScenario
 if TYPE_CHECKING:
     from miro_protocol.actions import ScriptItem
     from miro_robot.image import Image
-    from miro_sim.scenario.file import ScenarioText
+    from miro_sim.scenario.board_scenario import AnyText
     from miro_sim.scenario.keys import Scenario
     from miro_sim.world.world import World
     from mirotwin.verify.checks.monitors import Expected
@@ -48,7 +48,7 @@ class RunSpec(msgspec.Struct, frozen=True, kw_only=True):
     origin: str = ""
 
     @classmethod
-    def of(cls, text: ScenarioText, image: Image, seed: int = 0) -> RunSpec:
+    def of(cls, text: AnyText, image: Image, seed: int = 0) -> RunSpec:
         """Of a scenario that was read."""
         return cls(scenario=text.scenario, image=image, seed=seed, origin=text.origin)
 

@@ -250,6 +250,6 @@ def vision_text(vision: VisionCounts) -> str:
     return ", ".join(parts + [amount(*one) for one in happened if one[0]])
 
 
-def to_json(summary: Summary) -> bytes:
+def to_json(summary: msgspec.Struct) -> bytes:
     """`summary.json`: indented, keys in the order above, a newline at the end."""
     return json_bytes(summary, indent=2) + b"\n"

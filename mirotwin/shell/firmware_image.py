@@ -14,11 +14,12 @@ from miro_exact.bad_input import BadInput
 from miro_exact.clock import CONTROL_PERIOD_TICKS, TICKS_PER_SECOND
 from miro_exact.inputs import check_regular
 from miro_robot.firmware import image_path
-from miro_robot.image import FLASH_BYTES, Image, load_hex
+from miro_robot.image import FLASH_BYTES, SPACE_BYTES, Image, load_hex
 from miro_robot.image.symbol_files import STACK
 
 if TYPE_CHECKING:
     from miro_robot.mcs51.cpu import Cpu
+    from miro_sim.scenario.board_scenario import AnyText
 
 
 def load_firmware(
@@ -45,6 +46,18 @@ def load_firmware(
         reason = f"the .map beside the image begins its stack at {known.address:#04x}"
         raise BadInput(image.path, "--stack-from", reason, "leave the option out, or link with that stack")
     return msgspec.structs.replace(image, symbols=image.symbols.with_stack(stack_from))
+
+
+def image_for(text: AnyText, firmware: str | Path | None = None, stack_from: int | None = None) -> Image:
+    """The image that a scenario runs on: `firmware`, or the one that a board's scenario names, or the robot's own.
+
+    Raises BadInput as `load_firmware` does, and for a board without an image.
+    """
+    from miro_sim.scenario.board_scenario import BoardText, firmware_beside  # only some commands need it
+
+    if not isinstance(text, BoardText):
+        return load_firmware(firmware, stack_from=stack_from)
+    return load_firmware(firmware or firmware_beside(text), SPACE_BYTES, stack_from=stack_from)
 
 
 BOOT_PERIODS = 8

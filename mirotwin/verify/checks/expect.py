@@ -22,8 +22,8 @@ from miro_exact.plugins import PluginError, Registry
 from miro_exact.raised import raised
 from miro_sim.periods import RobotId
 from miro_sim.scenario.board import BoardScenario
+from miro_sim.scenario.board_scenario import AnyText
 from miro_sim.scenario.errors import Refused, ScenarioError, remedy_for_key, value_error
-from miro_sim.scenario.file import ScenarioText
 from miro_sim.scenario.keys import Scenario
 from mirotwin.verify.checks import OWN
 from mirotwin.verify.checks.interface import Check, problem_of_class
@@ -69,7 +69,7 @@ def expectations_of(scenario: Scenario | BoardScenario, origin: str) -> dict[Rob
     return checks
 
 
-def expectations_in(text: ScenarioText) -> dict[RobotId, list[Check]]:
+def expectations_in(text: AnyText) -> dict[RobotId, list[Check]]:
     """The expectations of a scenario that was read; an error names the setting that it concerns."""
     try:
         return expectations_of(text.scenario, text.origin)

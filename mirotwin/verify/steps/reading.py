@@ -15,8 +15,8 @@ from typing import Any, NoReturn, TypeVar
 import msgspec
 
 from miro_exact.plugins import use_one_of
+from miro_sim.scenario.board_scenario import AnyText
 from miro_sim.scenario.errors import ScenarioError, choices_of, remedy_for_key, value_error
-from miro_sim.scenario.file import ScenarioText
 from miro_sim.scenario.keys import Scenario
 from miro_sim.world.conditions import CONDITIONS, Condition, WheelSpeeds
 from mirotwin.verify.checks.expect import checks_of_table
@@ -28,14 +28,14 @@ _NO_KEYS = ("number", "checks", "verb", "condition")
 _TIMES = {"within_ms": "wait_for and expect", "from_now": "wait_for and expect", "for_ms": "never and hold"}
 
 
-def steps_of(scenario: Scenario, origin: str) -> list[Step]:
+def steps_of(scenario: Any, origin: str) -> list[Step]:
     """The steps of a scenario, of which each can be done in its run. Raises ScenarioError with the place."""
     steps = [_Table(scenario, origin, index, table).step() for index, table in enumerate(scenario.step)]
     check_order(steps, scenario, origin)
     return steps
 
 
-def steps_in(text: ScenarioText) -> list[Step]:
+def steps_in(text: AnyText) -> list[Step]:
     """The steps of a scenario that was read; an error names the setting that it concerns."""
     try:
         return steps_of(text.scenario, text.origin)

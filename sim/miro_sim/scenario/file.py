@@ -27,17 +27,16 @@ LONGEST_S = 86_400.0
 """The longest duration that a scenario may have: a day."""
 
 
-class ScenarioText(msgspec.Struct, frozen=True):
-    """A scenario together with its text, which a recording keeps: as it was read, or as the `settings` left it.
+class ReadText(msgspec.Struct, frozen=True):
+    """The text of a scenario, which a recording keeps: as it was read, or as the `settings` left it.
 
-    The text of one that names another (`base`) is that of the whole. `notes`: what the settings left out, a line each.
-    `source`: the text as it was read; `tables`: what became of it, None where that is the same. `made`: the settings
-    of the file and then `settings`.
+    The text of one that names another (`base`) or a board is that of the whole. `notes`: what the settings left out, a
+    line each. `source`: the text as it was read; `tables`: what became of it, None where that is the same. `made`: the
+    settings of the file and then `settings`.
     """
 
     origin: str
-    source: str
-    scenario: Scenario
+    source: str = ""
     settings: tuple[str, ...] = ()
     notes: tuple[str, ...] = ()
     tables: dict[str, Any] | None = None
@@ -50,6 +49,12 @@ class ScenarioText(msgspec.Struct, frozen=True):
     def blamed(self, error: ScenarioError) -> ScenarioError:
         """The same error in what somebody else reads in the scenario, naming the setting that it concerns."""
         return blamed(error, self.made, self.tables or {})
+
+
+class ScenarioText(ReadText, frozen=True, kw_only=True):
+    """A scenario of robots together with its text."""
+
+    scenario: Scenario
 
 
 def builtin_names() -> list[str]:
@@ -82,8 +87,8 @@ def load(source: str, settings: Sequence[str] = ()) -> ScenarioText:
 
 def of_text(text: str, origin: str, settings: Sequence[str] = ()) -> ScenarioText:
     """As `load`, of a text that `origin` names."""
-    raw = _tables(text, origin)
-    whole, own = with_base(raw, origin, lambda source: _tables(source_text(source), source))
+    raw = tables_of(text, origin)
+    whole, own = with_base(raw, origin, lambda source: tables_of(source_text(source), source))
     made = _checked(whole, origin, settings, own)
     same = whole is raw and not settings
     return msgspec.structs.replace(made, source=text, tables=None if same else whole)
@@ -131,10 +136,13 @@ def parse(text: str, origin: str, settings: Sequence[str] = ()) -> Scenario:
 def changed(scenario: Scenario, origin: str, settings: Sequence[str]) -> ScenarioText:
     """A scenario that stands in no file, with these settings. Raises ScenarioError."""
     raw = without_none(msgspec.to_builtins(scenario))
-    return _checked(raw, origin, settings) if settings else ScenarioText(origin, "", scenario, tables=raw)
+    return (
+        _checked(raw, origin, settings) if settings else ScenarioText(origin, scenario=scenario, tables=raw)
+    )
 
 
-def _tables(text: str, origin: str) -> dict[str, Any]:
+def tables_of(text: str, origin: str) -> dict[str, Any]:
+    """The tables of a scenario's text. Raises ScenarioError."""
     with ScenarioError.at(origin):
         return tables(text)
 
@@ -157,7 +165,7 @@ def _checked(
         try:
             scenario = _converted(raw, origin)
             notes = tuple(f"{path} leaves out {', '.join(keys)}" for path, keys in dropped.items())
-            return ScenarioText(origin, "", scenario, tuple(settings), notes, raw, tuple(made))
+            return ScenarioText(origin, "", tuple(settings), notes, raw, tuple(made), scenario=scenario)
         except ScenarioError as error:
             found = drop_other_kind(error, made)
             if found is None:
@@ -171,6 +179,9 @@ def _converted(raw: dict[str, Any], origin: str) -> Scenario:
     """The scenario of complete tables. Raises ScenarioError."""
     from miro_sim.scenario.build import check_robots  # needs hot modules: not before the engine was chosen
 
+    if "board" in raw:
+        what = "the scenario is for a board, and this command takes robots"
+        raise ScenarioError(origin, "board", what, "`mirotwin run` and `mirotwin test` take it")
     with ScenarioError.at(origin, "variant"):
         complete = with_variant(raw) if "variant" in raw else raw
     complete = _with_profiles(complete, origin)

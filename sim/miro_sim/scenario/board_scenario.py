@@ -1,0 +1,237 @@
+"""Scenario files of boards, and of either kind: `board = ".."` at the top of a file makes it one of a board.
+
+    board = "car.board.toml"                   a board file in this folder or below, a built-in board, or a whole table
+    firmware = "car.hex"                       in this folder or below; --firmware stands instead of it
+    duration_s = 20
+    straps = { mode = 0 }                      jumpers that are set otherwise than the board file says
+    put = { eyes.distance_cm = 60 }            values of parts at power-on
+    [expect]
+    [[step]]
+
+`scenario = ".."` with `set` (`base`) and settings work as for robots. What is read is a whole scenario: its board is a
+table, and it depends on no other file.
+"""
+
+from __future__ import annotations
+
+import os
+import re
+from collections.abc import Sequence
+from pathlib import Path
+from typing import Annotated, Any
+
+import msgspec
+from msgspec import Meta
+from msgspec.structs import replace
+
+from miro_exact.bad_input import BadInput, did_you_mean
+from miro_exact.inputs import path_beside
+from miro_protocol.toml_text import TomlError, check_numbers, struct_of
+from miro_robot.board_spec import BoardSpec
+from miro_robot.parts.values import checked_put
+from miro_sim.scenario import file as robots_file
+from miro_sim.scenario.base import SCENARIO, is_path, with_base
+from miro_sim.scenario.board import BoardScenario
+from miro_sim.scenario.board_file import ENDING, board_of_table, builtin_boards, load_board, table_of
+from miro_sim.scenario.errors import ScenarioError
+from miro_sim.scenario.file import ReadText, ScenarioText, builtin_names, source_text, tables_of
+from miro_sim.scenario.keys import Duration, Name
+from miro_sim.scenario.settings import Setting, blamed, make
+
+BOARD, FIRMWARE = "board", "firmware"
+Table = dict[str, Any]
+
+
+class _File(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_only=True):
+    """The keys of a scenario file of a board; see `BoardScenario`."""
+
+    board: Table
+    name: Name = "board"
+    title: Annotated[str, Meta(max_length=200)] = ""
+    firmware: str = ""
+    duration_s: Duration
+    stop_on_fault: bool = True
+    straps: dict[str, Annotated[int, Meta(ge=0, le=1)]] = {}
+    put: Table = {}
+    expect: Table = {}
+    step: tuple[Table, ...] = ()
+    bit_ticks: int = 0
+    begin_tick: int = 0
+
+
+class BoardText(ReadText, frozen=True, kw_only=True):
+    """A scenario of a board together with its text. `firmware`: the path of the image that it names, or ""."""
+
+    scenario: BoardScenario
+    firmware: str = ""
+
+
+AnyText = ScenarioText | BoardText
+
+
+def load_any(source: str, settings: Sequence[str] = ()) -> AnyText:
+    """The scenario that `source` names, of robots or of a board. A board itself is a scenario without a duration.
+
+    Raises BadInput: ScenarioError, or BoardError for what is wrong with the board's file.
+    """
+    if is_board(source):
+        return _checked({BOARD: table_of(load_board(source)), "name": _name_of(source)}, source, settings)
+    return any_of_text(source_text(source), source, settings)
+
+
+def is_board(source: str) -> bool:
+    """Whether it names a board, and no scenario."""
+    return source.endswith(ENDING) or (source in builtin_boards() and source not in builtin_names())
+
+
+def any_of_text(text: str, origin: str, settings: Sequence[str] = ()) -> AnyText:
+    """As `load_any`, of a text that `origin` names, or that stands in no file ("")."""
+    raw = tables_of(text, origin)
+    if BOARD not in raw and SCENARIO not in raw:
+        return robots_file.of_text(text, origin, settings)
+    whole, own = with_base(_complete(raw, origin), origin, lambda source: _complete(_read(source), source))
+    if BOARD not in whole:
+        return robots_file.of_text(text, origin, settings)
+    return _checked(whole, origin, settings, own)
+
+
+def any_of_table(raw: Table, origin: str) -> AnyText:
+    """As `load_any`, of the tables that a text without a file gave."""
+    if BOARD in raw:
+        return _checked(_complete(raw, ""), origin)
+    return ScenarioText(origin, tables=raw, scenario=robots_file.of_table(raw, origin))
+
+
+def _read(source: str) -> Table:
+    return tables_of(source_text(source), source)
+
+
+def _complete(raw: Table, origin: str) -> Table:
+    """The same with the board as a table, and with the image's path as it is called from here."""
+    complete = dict(raw)
+    if origin and isinstance(raw.get(FIRMWARE), str):
+        complete[FIRMWARE] = _beside(origin, FIRMWARE, raw[FIRMWARE])
+    if BOARD not in raw:
+        return complete
+    board = raw[BOARD]
+    if isinstance(board, str) and board:
+        complete[BOARD] = table_of(load_board(_beside(origin, BOARD, board) if is_path(board) else board))
+    elif not isinstance(board, dict):
+        what = f"expected a path, a name or a table, got {board!r}"
+        raise ScenarioError(origin, BOARD, what, 'write board = "NAME.board.toml"')
+    if origin:
+        complete.setdefault("name", _name_of(origin))
+    return complete
+
+
+def _beside(origin: str, key: str, path: str) -> str:
+    """What a file names, as it is called from here. Raises ScenarioError for what lies outside of its folder."""
+    if not origin:
+        what = "names a file, and stands in none itself"
+        raise ScenarioError(origin, key, what, "write the whole table instead")
+    with ScenarioError.at(origin, key):
+        return path_beside(origin, path)
+
+
+def _name_of(source: str) -> str:
+    """A name made of that of a file."""
+    stem = Path(source).name.removesuffix(".toml").removesuffix(".scenario").removesuffix(".board")
+    return re.sub(r"[^a-z0-9_-]+", "-", stem.lower()).strip("-_")[:64] or "board"
+
+
+def _checked(raw: Table, origin: str, settings: Sequence[str] = (), own: Sequence[Setting] = ()) -> BoardText:
+    """The scenario of these complete tables; makes the settings in them."""
+    made = [*own, *make(raw, settings, origin)]
+    try:
+        scenario = _scenario(raw, origin)
+    except ScenarioError as error:
+        raise blamed(error, made, raw) from error.__cause__
+    except RecursionError:
+        raise ScenarioError(origin, "", "nested too deeply", "tables have at most 5 levels") from None
+    firmware = raw.pop(FIRMWARE, "")
+    return BoardText(origin, "", tuple(settings), (), raw, tuple(made), scenario=scenario, firmware=firmware)
+
+
+def _scenario(raw: Table, origin: str) -> BoardScenario:
+    with ScenarioError.at(origin):
+        check_numbers(raw)
+        try:
+            file = struct_of(raw, _File)
+        except TomlError as error:
+            raise _explained(error, origin) from None
+        with ScenarioError.at("", BOARD):
+            board = board_of_table(file.board, "")
+        board = _strapped(board, file.straps)
+        put = _puts(board, file.put)
+        duration_ticks = max(1, int(file.duration_s * board.crystal_hz + 0.5))
+        try:
+            return BoardScenario(
+                name=file.name,
+                title=file.title,
+                board=board,
+                duration_ticks=duration_ticks,
+                stop_on_fault=file.stop_on_fault,
+                bit_ticks=file.bit_ticks,
+                begin_tick=file.begin_tick,
+                put=put,
+                expect=file.expect,
+                step=file.step,
+            )
+        except ValueError as error:
+            raise BadInput("", "", f"{error}") from None
+
+
+def _explained(error: TomlError, origin: str) -> BadInput:
+    if error.place == "duration_s" and is_board(origin):
+        return BadInput("", error.place, "how long to run is missing", "give --for TIME, such as --for 2s")
+    if error.place in ("network", "camera", "host", "lm629"):
+        return BadInput("", error.place, "is for robots, and this scenario is for a board", "remove it")
+    return error
+
+
+def _strapped(board: BoardSpec, levels: dict[str, int]) -> BoardSpec:
+    """The board with these straps at other levels."""
+    straps = dict(board.straps)
+    for name, level in levels.items():
+        if name not in straps:
+            remedy = f"its straps are {', '.join(straps)}" if straps else "its file has no [straps]"
+            raise BadInput(
+                "", f"straps.{name}", "the board has no such strap", did_you_mean(name, straps, remedy)
+            )
+        straps[name] = replace(straps[name], level=level)
+    return replace(board, straps=straps)
+
+
+def _puts(board: BoardSpec, table: Table) -> dict[str, Any]:
+    """The values in `put`, by PART.KEY, as the parts take them."""
+    parts = {name: part.keys for name, part in board.parts.items()}
+    puts = {}
+    for path, value in _flat(table):
+        try:
+            puts[path] = checked_put(parts, path, value)[2]
+        except ValueError as error:
+            reason, _, remedy = f"{error}".removeprefix(f"{path}: ").partition("; ")
+            raise BadInput("", f"put.{path}", reason, remedy) from None
+    return puts
+
+
+def _flat(table: Table, above: str = "") -> list[tuple[str, Any]]:
+    """The values of nested tables by their dotted path."""
+    found: list[tuple[str, Any]] = []
+    for key, value in table.items():
+        path = f"{above}{key}"
+        found += _flat(value, f"{path}.") if isinstance(value, dict) else [(path, value)]
+    return found
+
+
+def firmware_beside(text: BoardText) -> str:
+    """The image that a scenario of a board names. Raises BadInput where it names none that is there."""
+    if not text.firmware:
+        raise BadInput(
+            text.origin, "", "no firmware is named", 'give --firmware IMAGE.hex, or firmware = ".." in it'
+        )
+    if not os.path.exists(text.firmware):
+        raise BadInput(
+            text.origin, FIRMWARE, f"{text.firmware}: no such file", "build it, or give --firmware IMAGE"
+        )
+    return text.firmware
