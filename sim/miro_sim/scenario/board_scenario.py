@@ -115,13 +115,20 @@ def _complete(raw: Table, origin: str) -> Table:
         return complete
     board = raw[BOARD]
     if isinstance(board, str) and board:
-        complete[BOARD] = table_of(load_board(_beside(origin, BOARD, board) if is_path(board) else board))
+        complete[BOARD] = _board_table(origin, board)
     elif not isinstance(board, dict):
         what = f"expected a path, a name or a table, got {board!r}"
         raise ScenarioError(origin, BOARD, what, 'write board = "NAME.board.toml"')
     if origin:
         complete.setdefault("name", _name_of(origin))
     return complete
+
+
+def _board_table(origin: str, board: str) -> Table:
+    if is_path(board):  # an error names that file
+        return table_of(load_board(_beside(origin, BOARD, board)))
+    with ScenarioError.at(origin, BOARD):
+        return table_of(load_board(board))
 
 
 def _beside(origin: str, key: str, path: str) -> str:
@@ -227,9 +234,8 @@ def _flat(table: Table, above: str = "") -> list[tuple[str, Any]]:
 def firmware_beside(text: BoardText) -> str:
     """The image that a scenario of a board names. Raises BadInput where it names none that is there."""
     if not text.firmware:
-        raise BadInput(
-            text.origin, "", "no firmware is named", 'give --firmware IMAGE.hex, or firmware = ".." in it'
-        )
+        remedy = "give --firmware IMAGE.hex" + ("" if is_board(text.origin) else ', or firmware = ".." in it')
+        raise BadInput(text.origin, "", "no firmware is named", remedy)
     if not os.path.exists(text.firmware):
         raise BadInput(
             text.origin, FIRMWARE, f"{text.firmware}: no such file", "build it, or give --firmware IMAGE"

@@ -1,0 +1,97 @@
+"""`mirotwin run` of a board: its files, its table, and runs that go on as if they had never stopped."""
+
+import json
+
+import pytest
+
+from mirotwin.recording.reader import read
+from tests.mirotwin.board_files import board_folder
+
+PERIOD_S = 2_400_000 / 11_059_200
+
+
+@pytest.fixture(scope="module")
+def scenario(tmp_path_factory):
+    return board_folder(tmp_path_factory.mktemp("board"))
+
+
+@pytest.fixture(scope="module")
+def finished(mirotwin, scenario):
+    mirotwin.succeeds("run", scenario, "--out", scenario.parent / "finished")
+    return scenario.parent / "finished"
+
+
+def test_a_run_of_a_board_writes_a_recording_and_a_summary(finished):
+    assert sorted(path.name for path in finished.iterdir()) == ["run.mcap", "summary.json"]
+    summary = json.loads((finished / "summary.json").read_bytes())
+    recording = read(finished / "run.mcap")
+    assert summary["digest"] == recording.digest
+    assert summary["simulated_s"] == pytest.approx(3 * PERIOD_S)
+    assert (summary["board"], summary["chip"], summary["crystal_hz"]) == ("lamp", "stc89c52", 11_059_200)
+    assert summary["serial"] == {"to_board": 0, "from_board": 1}
+    assert summary["parts"]["key.closed"] is True
+
+
+def test_the_recording_holds_the_whole_board_its_bytes_and_the_values_of_its_parts(finished):
+    recording = read(finished / "run.mcap")
+    assert (recording.source.crystal_hz, recording.source.scenario_name) == (11_059_200, "lamp")
+    assert "[board.parts.key]" in recording.source.scenario_text
+    assert [sent.data for period in recording.periods for sent in period.wire] == [b"R"]
+    assert [list(one.values) for period in recording.periods for one in period.values] == [
+        ["key.pressed", "key.closed", "lamp.on", "lamp.flashes"]
+    ] * 3
+
+
+def test_the_same_run_gives_the_same_bytes(mirotwin, finished, scenario, tmp_path):
+    assert mirotwin("run", scenario, "--out", tmp_path / "again", "--quiet") == (0, "", "")
+    assert (tmp_path / "again" / "run.mcap").read_bytes() == (finished / "run.mcap").read_bytes()
+
+
+def test_the_table_names_what_matters(mirotwin, scenario, tmp_path):
+    out = mirotwin.succeeds("run", scenario, "--out", tmp_path / "out")
+    for word in (
+        "lamp, seed 0",
+        "stc89c52, 11.0592 MHz",
+        "real time",
+        "the last: 'R'",
+        "pressed True",
+        "lamp.hex",
+    ):
+        assert word in out
+
+
+def test_a_board_file_is_run_with_an_image_for_a_time(mirotwin, scenario, tmp_path):
+    board, image = scenario.with_name("lamp.board.toml"), scenario.with_name("lamp.hex")
+    for time in ("200ms", "2211840t"):
+        out = tmp_path / time
+        mirotwin.succeeds("run", board, "--firmware", image, "--for", time, "--out", out, "-q")
+        assert json.loads((out / "summary.json").read_bytes())["simulated_s"] == pytest.approx(PERIOD_S)
+
+
+def test_a_run_that_is_resumed_has_the_bits_of_one_that_never_stopped(mirotwin, finished, scenario, tmp_path):
+    mirotwin.succeeds("run", scenario, "--out", tmp_path / "a", "--save-at", "100ms", "--to", "300ms")
+    saved = tmp_path / "a" / "at-1105920.world"
+    out = mirotwin.succeeds("run", scenario, "--out", tmp_path / "b", "--resume", saved)
+    assert read(tmp_path / "b" / "run.mcap").digest == read(finished / "run.mcap").digest
+    assert "resumed" in out
+    assert "--to 55296000t (5000.000 ms): the run goes from" in mirotwin.refuses(
+        "run", scenario, "--out", tmp_path / "c", "--to", "5s"
+    )
+
+
+def test_what_is_only_for_robots_or_missing_is_refused(mirotwin, scenario, tmp_path):
+    board = scenario.with_name("lamp.board.toml")
+    assert "--frames is for robots" in mirotwin.refuses("run", scenario, "--frames", tmp_path / "frames")
+    assert "--record is for robots" in mirotwin.refuses("run", scenario, "--record", "full")
+    assert "give --firmware IMAGE.hex" in mirotwin.refuses("run", board, "--for", "1s")
+    assert "give --for TIME" in mirotwin.refuses("run", board, "--firmware", scenario.with_name("lamp.hex"))
+    assert "this command takes robots" in mirotwin.refuses("campaign", "run", scenario) + mirotwin.refuses(
+        "serve", scenario
+    )
+
+
+def test_a_fault_ends_the_run_with_its_own_code(mirotwin, tmp_path):
+    path = board_folder(tmp_path, program="MOV SP,#0FFh\nNOP\nDB 0A5h\nSJMP $")
+    line = mirotwin.ends(3, "run", path, "--out", tmp_path / "out", "-q")
+    assert "firmware fault: firmware executed the undefined opcode A5 at 0x0004" in line
+    assert "/fault" in str((tmp_path / "out" / "run.mcap").read_bytes())
