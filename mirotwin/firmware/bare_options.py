@@ -1,4 +1,4 @@
-"""Options of an image on the bare processor: `fw run` and the other `fw` commands have them in common."""
+"""Options of an image on the bare processor or on a board, which `fw run` and the other `fw` commands share."""
 
 from __future__ import annotations
 
@@ -8,13 +8,15 @@ from collections.abc import Callable
 from enum import StrEnum
 from typing import Annotated
 
-from miro_exact import clock
+import msgspec
+
 from miro_exact.bad_input import BadInput, amount
 from miro_exact.inputs import TEXT_BYTES, read_input
-from miro_robot.board_spec import BoardSpec
+from miro_robot.board_spec import CRYSTAL_HZ, BoardSpec
 from miro_robot.empty_board import EmptyBoard
 from miro_robot.image import FLASH_BYTES, SPACE_BYTES, Image
 from miro_sim.scenario.board import BoardScenario
+from miro_sim.scenario.board_file import load_board
 from miro_sim.scenario.terminal import InputPiece, PinEvent, TerminalSpec, read_pins
 from miro_sim.world.terminal import Terminal
 from miro_sim.world.wire import Wire
@@ -46,7 +48,7 @@ CRYSTAL = Option(
     "--crystal",
     type=Whole(32_768, 100_000_000),
     metavar="HZ",
-    help="Crystal frequency; a tick is one period, a machine cycle 12. Default 24000000.",
+    help="Crystal frequency; a tick is one period, a machine cycle 12. Default 24000000; a board has its own.",
 )
 BAUD = Option(
     "--baud",
@@ -57,10 +59,19 @@ BAUD = Option(
 
 
 class BareOptions(Options, frozen=True, kw_only=True):
-    """What the command line says about the bare processor."""
+    """What the command line says about the bare processor, or about the board that is around it."""
 
-    HEADING = "Image on the bare processor"
+    HEADING = "Image on the bare processor, or on a board"
 
+    board: Annotated[
+        str | None,
+        Option(
+            type=NAME,
+            metavar="BOARD",
+            help="Board on which the image runs: a NAME.board.toml, or one of `mirotwin boards`. Default: the bare"
+            " processor with 64 KB of external RAM.",
+        ),
+    ] = None
     until: Annotated[
         str | None,
         Option(
@@ -142,13 +153,9 @@ class BareOptions(Options, frozen=True, kw_only=True):
     stack_from: StackFrom = None
 
     @property
-    def crystal_hz(self) -> int:
-        return self.crystal or clock.TICKS_PER_SECOND
-
-    @property
     def files(self) -> tuple[str | None, ...]:
         """What is read, and so must not be written."""
-        return (*(path for path in self.stdin if path != STDIN), self.pins)
+        return (*(path for path in self.stdin if path != STDIN), self.pins, self.board)
 
 
 def load_bare_image(path: str, options: BareOptions, named: bool = True) -> Image:
@@ -157,7 +164,8 @@ def load_bare_image(path: str, options: BareOptions, named: bool = True) -> Imag
         raise BadInput(
             "", "--code-size", "program and data share 64 KB with --code-in-xram", "leave one of the two out"
         )
-    limit = SPACE_BYTES if options.code_in_xram else options.code_size or FLASH_BYTES
+    whole = options.code_in_xram or options.board is not None
+    limit = options.code_size or (SPACE_BYTES if whole else FLASH_BYTES)
     return load_firmware(path, limit, named, options.stack_from)
 
 
@@ -187,16 +195,23 @@ def make_world(
     until: int | None = None,
     output: Callable[[bytes], object] | None = None,
     live: bool = False,
+    seed: int = 0,
 ) -> World:
-    """A world of one board, from the options. `output` gets what it sends. Raises BadInput, and errors of the files
-    read.
+    """A world of one board, from the options. `output` gets what it sends; `seed`: of the noise of its parts.
+
+    Raises BadInput, and errors of the files read.
     """
-    pieces, pins = _pieces(options), _pins(options)
-    hz = options.crystal_hz
-    board = BoardSpec(crystal_hz=hz, code_in_xram=options.code_in_xram, start=_start(image, options))
+    board = msgspec.structs.replace(_board(options), start=_start(image, options))
+    hz = board.crystal_hz
+    pieces, pins = _pieces(options, hz), _pins(options)
     gap_ticks = 0 if options.stdin_gap is None else options.stdin_gap.ticks(hz)
     terminal = TerminalSpec(
-        pieces=pieces, baud=options.baud, gap_ticks=gap_ticks, wait=options.stdin_wait, live=live, pins=pins
+        pieces=pieces,
+        baud=options.baud or board.baud or None,
+        gap_ticks=gap_ticks,
+        wait=options.stdin_wait,
+        live=live,
+        pins=pins,
     )
     scenario = BoardScenario(
         board=board,
@@ -206,7 +221,7 @@ def make_world(
         terminal=terminal,
     )
     try:
-        world = RunSpec(scenario=scenario, image=image).world()
+        world = RunSpec(scenario=scenario, image=image, seed=seed).world()
     except ValueError as error:
         raise BadInput(
             "", "", f"--{error}" if str(error).startswith("baud") else f"--pins: {error}"
@@ -234,6 +249,12 @@ def terminal_of(world: World) -> Terminal:
     return terminal
 
 
+def has_terminal(world: World) -> bool:
+    """Whether the world is that of an image, with what the command line sends to it."""
+    line = world.lines[0]
+    return isinstance(line, Wire) and line.terminal is not None
+
+
 def ended(world: World, max_cycles: int | None) -> Ended:
     """Why a world of one board stands where it does."""
     board = board_of(world)
@@ -242,6 +263,16 @@ def ended(world: World, max_cycles: int | None) -> Ended:
     if board.fault_count and board.stop_on_fault:
         return Ended.FAULT
     return Ended.HALTED if board.ended else Ended.UNTIL
+
+
+def _board(options: BareOptions) -> BoardSpec:
+    """The board of --board, or the bare processor. Raises BadInput for a board that cannot be, or cannot have this."""
+    if options.board is None:
+        return BoardSpec(crystal_hz=options.crystal or CRYSTAL_HZ, code_in_xram=options.code_in_xram)
+    for option in options.given("crystal", "code_in_xram", "pins"):
+        remedy = "put a button or a strap there" if option == "--pins" else "change the board file"
+        raise BadInput(options.board, "", f"is a board, {option} does not apply to it", remedy)
+    return load_board(options.board)
 
 
 def _start(image: Image, options: BareOptions) -> int:
@@ -301,7 +332,7 @@ def stopped_at(world: World) -> str:
     return f"{place_of(cpu.pc, world.image)} after {amount(cpu.cycles, 'machine cycle')}"
 
 
-def _pieces(options: BareOptions) -> tuple[InputPiece, ...]:
+def _pieces(options: BareOptions, crystal_hz: int) -> tuple[InputPiece, ...]:
     """What --stdin and its conditions say, in order."""
     texts = [text.encode(errors="surrogateescape") for text in options.stdin_when]
     files = len(options.stdin)
@@ -325,16 +356,16 @@ def _pieces(options: BareOptions) -> tuple[InputPiece, ...]:
         raise BadInput("", "--stdin-by-line", "has no effect without --stdin-when", "give that too")
     whens = [b""] * (files - len(texts)) + texts
     pieces: list[InputPiece] = []
-    for path, when, delay in zip(options.stdin, whens, _delays(whens, options), strict=True):
+    for path, when, delay in zip(options.stdin, whens, _delays(whens, options, crystal_hz), strict=True):
         data = _stdin_bytes(path)
         parts = data.splitlines(keepends=True) if options.stdin_by_line and when else [data]
         pieces += [InputPiece(part, when, delay) for part in parts]
     return tuple(pieces)
 
 
-def _delays(whens: list[bytes], options: BareOptions) -> list[int | None]:
+def _delays(whens: list[bytes], options: BareOptions, crystal_hz: int) -> list[int | None]:
     """The delay of each --stdin: its own, or the only one for the first and for all that wait for a text."""
-    after = [time.ticks(options.crystal_hz) for time in options.stdin_after]
+    after = [time.ticks(crystal_hz) for time in options.stdin_after]
     if len(after) not in (0, 1, len(whens)):
         reason = f"{len(after)} for {len(whens)} --stdin"
         raise BadInput("", "--stdin-after", reason, "give one for all, or one for each --stdin")

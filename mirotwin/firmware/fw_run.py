@@ -1,4 +1,4 @@
-"""`mirotwin fw run`: an image on the bare processor, with nothing but its serial port and pins connected.
+"""`mirotwin fw run`: an image on a board, or on the bare processor with nothing but its serial port and pins connected.
 
 With --terminal the keyboard and the screen are a terminal on that port. This is one of the few places that know the
 wall clock. The machine does not: the same keys at the same machine cycles give the same bits. The terminal has its old
@@ -37,6 +37,7 @@ from mirotwin.firmware.bare_options import (
 from mirotwin.shell.command import Argument, Option, Options, command_of
 from mirotwin.shell.options import NAME, PATH, Engine
 from mirotwin.shell.outputs import check_file, whole_file
+from mirotwin.shell.part_files import Parts, bring_parts
 from mirotwin.shell.program import complain
 from mirotwin.shell.progress import ProgressBar
 
@@ -79,7 +80,7 @@ def run_world(world: World, options: BareOptions) -> None:
 
 def run_terminal(world: World, options: BareOptions) -> None:
     """Runs `world`, whose terminal must be live, in the time of its crystal until it ends or Ctrl-] is typed."""
-    slice_ticks = max(1, int(options.crystal_hz / CYCLE_TICKS * SLICE_S)) * CYCLE_TICKS
+    slice_ticks = max(1, int(world.clock / CYCLE_TICKS * SLICE_S)) * CYCLE_TICKS
     end_tick = limit_tick(options)
     keyboard = sys.stdin.fileno()
     with _raw(keyboard):
@@ -131,9 +132,9 @@ def _raw(keyboard: int) -> Iterator[None]:
 
 
 def dumped(world: World) -> dict[str, object]:
-    """Registers and memories; SFRs by two hex digits, ports at their latches."""
+    """Registers and memories, SFRs by two hex digits, ports at their latches; of a board the values of its parts."""
     board = board_of(world)
-    cpu = board.cpu
+    cpu, values = board.cpu, world.devices[0].values()
     return {
         "pc": cpu.pc,
         "cycles": cpu.cycles,
@@ -141,6 +142,7 @@ def dumped(world: World) -> dict[str, object]:
         "iram_hex": bytes(cpu.peek_iram(address) for address in range(0x100)).hex(),
         "sfr": {f"{address:02x}": cpu.sfr(address) for address in range(0x80, 0x100)},
         "xram_hex": board.xram().hex(),
+        **({"parts": values} if values else {}),
     }
 
 
@@ -156,12 +158,13 @@ class FwRunOptions(Options, frozen=True, kw_only=True):
         Path | None,
         Option(type=PATH, metavar="FILE.json", help="Write registers and memories to this file at the end."),
     ] = None
+    parts: Parts = ()
     engine: Engine = None
 
 
 @command_of(FwRunOptions)
 def run(options: FwRunOptions) -> int:
-    """Runs IMAGE.ihx on a bare AT89C52; what it sends goes to stdout as it is.
+    """Runs IMAGE.ihx on a bare AT89C52, or on a board (--board); what it sends goes to stdout as it is.
 
     MORE.ihx are loaded beside it: a program and the monitor that starts it.
 
@@ -176,6 +179,7 @@ def run(options: FwRunOptions) -> int:
         --stdin-when '> ' --stdin commands.txt --stdin-by-line
     """
     image, bare, dump = options.image, options.bare, options.dump
+    bring_parts(options.parts)
     if dump is not None:
         check_file(dump, "--dump", image, *options.more, *bare.files)
     if options.terminal:

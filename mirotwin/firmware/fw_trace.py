@@ -84,16 +84,15 @@ def vcd(options: VcdOptions) -> int:
 
     with whole_file(save, "--out") as save_staging, whole_file(out, "--out") as staging:
         with staging.open("w", encoding="ascii", newline="\n") as stream:
-            waveform = Waveform(stream, run.device.board, options.from_tick, options.to_tick, run.tick_hz)
+            from_tick, to_tick = options.ticks(run.tick_hz)
+            waveform = Waveform(stream, run.device.board, from_tick, to_tick, run.tick_hz)
             run.tell_pins(waveform.pin_moved)
             early_ticks = 2 * SETTLING_TICKS
             code = look(run, options, waveform.tap, early_ticks=early_ticks, late_ticks=LATE_TICKS)
             try:
                 waveform.close()
             except ValueError as error:
-                raise BadInput(
-                    options.subject, f"--from {options.from_tick}t", f"{error}", "look earlier"
-                ) from None
+                raise BadInput(options.subject, f"--from {from_tick}t", f"{error}", "look earlier") from None
         with save_staging.open("w", encoding="utf-8", newline="\n") as stream:
             write_save_file(stream, one_line(out.name), waveform.signals)
     first_s, last_s = waveform.first_tick / run.tick_hz, waveform.written_tick / run.tick_hz

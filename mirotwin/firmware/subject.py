@@ -1,18 +1,28 @@
-"""SUBJECT, what the `mirotwin fw` commands look into: an image, a scenario, a recording or a stream file."""
+"""SUBJECT, what the `mirotwin fw` commands look into: an image, a board, a scenario, a recording or a stream file."""
 
 from __future__ import annotations
 
 import os
 from typing import Annotated
 
+import msgspec
+
 from miro_exact import clock
 from miro_exact.bad_input import BadInput
 from miro_exact.plugins import use_one_of
 from miro_robot.inspect.watcher import Watcher
 from miro_sim.radio.downlink import TransmissionError
+from miro_sim.scenario.board_file import ENDING, builtin_boards
 from miro_sim.scenario.file import builtin_names, load
 from miro_sim.world.world import World
-from mirotwin.firmware.bare_options import BareOptions, load_bare_image, make_world, report, target_of
+from mirotwin.firmware.bare_options import (
+    BareOptions,
+    has_terminal,
+    load_bare_image,
+    make_world,
+    report,
+    target_of,
+)
 from mirotwin.runs.inspected_run import InspectedRun, watch
 from mirotwin.runs.job import load_job
 from mirotwin.runs.result import fault_lines
@@ -32,6 +42,7 @@ from mirotwin.shell.options import (
     plain_parameters,
     refuse_steps,
 )
+from mirotwin.shell.part_files import Parts, bring_parts
 from mirotwin.shell.program import complain, report_lines, tell_notes
 from mirotwin.shell.progress import ProgressBar
 from mirotwin.shell.times import Time, window
@@ -44,9 +55,10 @@ class SubjectOptions(Options, frozen=True, kw_only=True):
     """SUBJECT, and what the command line says about its run."""
 
     subject: Annotated[str, Argument("SUBJECT", NAME)]
-    seed: Annotated[int | None, SEED.saying("Scenario: master seed of all noise. Default 0.")] = None
+    seed: Annotated[int | None, SEED.saying("Scenario, board: master seed of all noise. Default 0.")] = None
     firmware: Annotated[
-        str | None, FIRMWARE.saying("Scenario, recording, stream: image to run instead of its own.")
+        str | None,
+        FIRMWARE.saying("Board: its image. Scenario, recording, stream: image to run instead of its own."),
     ] = None
     settings: Annotated[
         tuple[str, ...],
@@ -58,6 +70,7 @@ class SubjectOptions(Options, frozen=True, kw_only=True):
     ] = ()
     network: Annotated[int | None, NETWORK.saying("Network of the robot. Default 0.")] = None
     slot: Annotated[int | None, SLOT.saying("Slot of the robot. Default: the lowest slot used.")] = None
+    parts: Parts = ()
     engine: Engine = None
     bare: BareOptions = BareOptions()
 
@@ -73,13 +86,9 @@ class WindowOptions(SubjectOptions, frozen=True, kw_only=True):
     from_time: Annotated[Time | None, FROM] = None
     to_time: Annotated[Time | None, TO.saying("End there. Default: the end of the run.")] = None
 
-    @property
-    def from_tick(self) -> int:
-        return window(self.from_time, self.to_time, self.bare.crystal_hz)[0]
-
-    @property
-    def to_tick(self) -> int | None:
-        return window(self.from_time, self.to_time, self.bare.crystal_hz)[1]
+    def ticks(self, crystal_hz: int) -> tuple[int, int | None]:
+        """Where the window begins and ends; None: with the run. Raises BadInput for an empty one."""
+        return window(self.from_time, self.to_time, crystal_hz)
 
 
 def open_window(options: WindowOptions) -> InspectedRun:
@@ -87,8 +96,11 @@ def open_window(options: WindowOptions) -> InspectedRun:
 
     An empty window is refused before anything is read.
     """
-    from_tick, to_tick = options.from_tick, options.to_tick
+    first, last = options.from_time, options.to_time
+    if first is None or last is None or first.in_ticks == last.in_ticks:
+        options.ticks(clock.TICKS_PER_SECOND)
     run = open_run(options)
+    from_tick, to_tick = options.ticks(run.tick_hz)
     begin_tick = run.cpu.cycles * clock.CYCLE_TICKS
     if to_tick is not None and to_tick <= begin_tick:
         reason = f"the run begins at tick {begin_tick}"
@@ -101,8 +113,16 @@ def open_window(options: WindowOptions) -> InspectedRun:
 
 def open_run(options: SubjectOptions) -> InspectedRun:
     """The requested run, at its first tick. Raises BadInput."""
-    if options.subject.lower().endswith(IMAGE_SUFFIXES):
-        return _bare_run(options)
+    bring_parts(options.parts)
+    subject = options.subject
+    if subject.lower().endswith(IMAGE_SUFFIXES):
+        return _image_run(options, subject, options.bare)
+    if subject.endswith(ENDING) or subject in set(builtin_boards()) - set(builtin_names()):
+        if options.firmware is None:
+            raise BadInput(
+                subject, "", "is a board, and no program for it is named", "give --firmware IMAGE.hex"
+            )
+        return _image_run(options, options.firmware, msgspec.structs.replace(options.bare, board=subject))
     return _robot_run(options)
 
 
@@ -114,8 +134,9 @@ def look(
     They look on from `early_ticks` before the window to `late_ticks` behind it, as far as the run goes.
     Raises BadInput when the run was over before there was anything to look at.
     """
-    first_tick = max(0, options.from_tick - early_ticks)
-    last_tick = None if options.to_tick is None else options.to_tick + late_ticks
+    from_tick, to_tick = options.ticks(run.tick_hz)
+    first_tick = max(0, from_tick - early_ticks)
+    last_tick = None if to_tick is None else to_tick + late_ticks
     end_tick = min((tick for tick in (run.end_tick, last_tick) if tick is not None), default=None)
     with ProgressBar(f"running {options.subject}", end_tick) as bar:
         try:
@@ -127,9 +148,9 @@ def look(
     if not reached:
         end = run.cpu.cycles * clock.CYCLE_TICKS
         raise BadInput(
-            options.subject, f"--from {options.from_tick}t", f"the run ended at tick {end}", "look earlier"
+            options.subject, f"--from {from_tick}t", f"the run ended at tick {end}", "look earlier"
         )
-    if run.job is not None or run.board is not None:
+    if run.job is not None or not has_terminal(run.world):
         return report_lines(fault_lines(run.world.devices))
     return report(run.world, options.bare)
 
@@ -139,20 +160,15 @@ def _refuse(options: SubjectOptions, kind: str, *fields: str) -> None:
         raise BadInput(options.subject, "", f"is {kind}, {option} does not apply to it", "leave it out")
 
 
-def _bare_run(options: SubjectOptions) -> InspectedRun:
-    _refuse(
-        options,
-        "an image on the bare processor",
-        "seed",
-        "firmware",
-        "settings",
-        "expected",
-        "network",
-        "slot",
-    )
-    image = load_bare_image(options.subject, options.bare)
-    world = make_world(image, options.bare, target_of(options.subject, image, options.bare))
-    cycles = options.bare.max_cycles
+def _image_run(options: SubjectOptions, path: str, bare: BareOptions) -> InspectedRun:
+    """An image on the bare processor, or on a board."""
+    kind = "an image on the bare processor" if bare.board is None else "a board, or an image on one"
+    other = () if path == options.firmware else ("firmware",)
+    without_noise = ("seed",) if bare.board is None else ()
+    _refuse(options, kind, *without_noise, *other, "settings", "expected", "network", "slot")
+    image = load_bare_image(path, bare)
+    world = make_world(image, bare, target_of(path, image, bare), seed=options.seed or 0)
+    cycles = bare.max_cycles
     return InspectedRun(world, end_tick=None if cycles is None else cycles * clock.CYCLE_TICKS)
 
 

@@ -5,7 +5,8 @@ from miro_robot.parts.button import Button
 from miro_robot.parts.led import Led
 from miro_sim.scenario.board import BoardScenario
 from mirotwin.runs.spec import RunSpec
-from tests.robot.mcs51.asm import image_of
+from tests.mirotwin.conftest import hex_file
+from tests.robot.mcs51.asm import assemble, image_of
 
 CRYSTAL_HZ = 11_059_200
 PROGRAM = """
@@ -44,3 +45,23 @@ def world_of(script=None, **more):
     """The board with the program, run by `script`, or by who injects."""
     scenario = BoardScenario(board=SPEC, **more)
     return RunSpec(scenario=scenario, image=IMAGE, script=script).world()
+
+
+BOARD_FILE = """
+crystal_hz = 11_059_200
+[nets]
+KEY = "P3.2"
+[parts.key]
+part = "button"
+pins = { pin = "KEY" }
+[parts.lamp]
+part = "led"
+pins = { pin = "P1.0" }
+"""
+
+
+def files_of_board(folder):
+    """`lamp.board.toml` and `lamp.hex` in a folder."""
+    board = folder / "lamp.board.toml"
+    board.write_text(BOARD_FILE)
+    return board, hex_file(folder / "lamp.hex", assemble(PROGRAM))
