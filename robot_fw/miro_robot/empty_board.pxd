@@ -24,7 +24,10 @@ cdef class EmptyBoard(ProcessorBoard):
 
     cdef int _run(self, tuple addresses, long long until_tick) except -1
     cdef int _run_on(self, tuple marks, long long until_cycle) except -1
+    cdef bint _may_wake(self) except -1
+    cdef _note_fault(self, int kind, int pc, long long tick, detail)
     cdef _sleep_on(self, long long until_cycle)
+    cdef _step(self)
     cdef _pass_mark(self, tuple addresses)
     cdef bint _say_ended(self) except -1
     cdef long long _silent_cycle(self) except -1

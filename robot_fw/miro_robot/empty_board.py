@@ -133,7 +133,7 @@ class EmptyBoard(ProcessorBoard):
             if reason == BREAKPOINT:
                 self._pass_mark(addresses)
             elif reason == ASLEEP:
-                if cpu.powered_down or self.input_tick == NEVER_TICK or not self._interruptible():
+                if cpu.powered_down or not self._may_wake() or not self._interruptible():
                     self.dead = 1
                 else:
                     self._sleep_on(min(self.next_check, until_cycle))
@@ -154,6 +154,10 @@ class EmptyBoard(ProcessorBoard):
         cpu.stop_asleep = 0
         return reason
 
+    def _may_wake(self) -> bool:
+        """Whether a level on a pin may come that nobody has announced."""
+        return self.input_tick != NEVER_TICK
+
     def _sleep_on(self, until_cycle: int) -> None:
         """Runs without asking what could wake the CPU."""
         self.cpu.run(until_cycle)
@@ -164,13 +168,17 @@ class EmptyBoard(ProcessorBoard):
         address = cpu.pc
         if address in addresses:
             self.log.note(REACHED, cpu.cycles * CYCLE_TICKS, cpu.instructions, address)
-        cpu.step()
+        self._step()
         if self.dead or address not in self.ends:
             return
         if cpu.pc == address and not self._interruptible():
             self.dead = 1
         else:
             self.ends = tuple([end for end in self.ends if end != address])
+
+    def _step(self) -> None:
+        """One instruction."""
+        self.cpu.step()
 
     def _look_for_ends(self) -> None:
         code_at = self._code_at
@@ -270,13 +278,14 @@ class EmptyBoard(ProcessorBoard):
 
     def fault(self, kind: int, pc: int, tick: int) -> None:
         """Notes a firmware fault; the run stops after this instruction if it has to."""
-        if self.forced:
-            return
+        if not self.forced:
+            self._note_fault(kind, pc, tick, self.cpu.stack_said() if kind in STACK_FAULTS else "")
+
+    def _note_fault(self, kind: int, pc: int, tick: int, detail: str) -> None:
         self.fault_count += 1
         self.log.note(FAULT, tick, kind, pc)
         if len(self.faults) < FAULTS_KEPT:
             symbol = self.image.symbols.name_at(pc)
-            detail = self.cpu.stack_said() if kind in STACK_FAULTS else ""
             self.faults.append(FirmwareFault(FaultKind(kind), tick, pc, symbol, detail))
         if self.stop_on_fault:
             self.cpu.request_stop()

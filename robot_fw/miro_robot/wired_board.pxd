@@ -3,7 +3,8 @@ from miro_robot.empty_board cimport EmptyBoard
 from miro_robot.parts.nets cimport Nets
 
 cdef long long CYCLE_TICKS, NEVER_TICK, _BEHIND_TICKS
-cdef int FAULT, REPLAN, _CONTENTION, _FAULTS_KEPT
+cdef unsigned char _TWO_CYCLES[256]
+cdef int REPLAN, STOPPED, _CONTENTION
 
 
 cdef class WiredBoard(EmptyBoard):
@@ -11,15 +12,23 @@ cdef class WiredBoard(EmptyBoard):
     cdef readonly dict part_index
     cdef readonly Nets nets
     cdef long long horizon
+    cdef int pushed[4]
 
+    @cython.locals(faults='long long')
     cdef int _run(self, tuple addresses, long long until_tick) except -1
     cdef int _run_on(self, tuple marks, long long until_cycle) except -1
-    @cython.locals(due='long long', stop_cycle='long long')
+    cdef _sleep_on(self, long long until_cycle)
+    cdef bint _may_wake(self) except -1
+    cdef int _go_on(self, tuple marks, long long until_cycle) except -1
+    @cython.locals(due='long long', due_cycle='long long', stop_cycle='long long', reason=int, faults='long long')
     cdef int _run_pieces(self, long long until_cycle) except -1
-    @cython.locals(now='long long')
+    cdef bint _is_before_write(self, long long due_cycle) except -1
+    cdef _step(self)
+    @cython.locals(now='long long', nets=Nets)
     cpdef int sync(self, long long tick) except -1
-    @cython.locals(port=int, net=int, due='long long')
-    cdef int _push(self, long long tick) except -1
+    @cython.locals(port=int, nets=Nets)
+    cdef inline int _push(self, long long tick) except -1
+    @cython.locals(net=int)
+    cdef _judge(self, long long tick)
     cdef _note_faults(self, long long tick)
-    cdef _note(self, int kind, str detail, long long tick)
     cdef _supply(self, int on, long long tick)

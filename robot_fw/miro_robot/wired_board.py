@@ -5,7 +5,8 @@
 
 The CPU runs alone up to the first event of a part that may come to one of its pins; the other parts may be behind it
 meanwhile. An instruction waits for an event if it begins in a cycle whose S5P2, tick 9, is not before it (P2). A run to
-a tick does what happens before it; what a test puts then comes first on its tick, between two instructions.
+a tick does what happens before it; what a test puts then comes first on its tick, between two instructions. Contention
+is judged when a tick is over: after its events, or after what the CPU writes on it.
 """
 
 from __future__ import annotations
@@ -14,30 +15,31 @@ from collections.abc import Sequence
 from operator import itemgetter
 from typing import Any
 
-from miro_exact.clock import CYCLE_TICKS
+from miro_exact.clock import CYCLE_TICKS, NEVER_TICK
 from miro_exact.plugins import PluginError
 from miro_exact.raised import raised
 from miro_robot.board_spec import BoardSpec
-from miro_robot.empty_board import FAULTS_KEPT, EmptyBoard
-from miro_robot.event_log import FAULT
-from miro_robot.faults import FaultKind, FirmwareFault
+from miro_robot.empty_board import EmptyBoard
+from miro_robot.faults import FaultKind
 from miro_robot.image import Image
-from miro_robot.mcs51.cpu import REPLAN
+from miro_robot.mcs51.cpu import REPLAN, STOPPED
+from miro_robot.mcs51.opcodes import CYCLES
 from miro_robot.parts.netlist import Netlist
 from miro_robot.parts.nets import Nets
 from miro_robot.parts.part import Part
 
 _CONTENTION = int(FaultKind.NET_CONTENTION)
-_BEHIND_TICKS = 96  # more than an instruction: so far parts may be behind the CPU
-_FAULTS_KEPT = FAULTS_KEPT
+_MOVX = (0xE0, 0xE2, 0xE3, 0xF0, 0xF2, 0xF3)  # writes no register but P0, at which nothing is sampled
+_TWO_CYCLES = [int(CYCLES[opcode] == 2 and opcode not in _MOVX) for opcode in range(256)]
 _order_and_kind = itemgetter(0, 1)
+_BEHIND_TICKS = 96  # more than an instruction: so far parts may be behind the CPU
 
 
 class WiredBoard(EmptyBoard):
     """`parts` in the order of their names, on the nets of `netlist`. A run raises PluginError for a part that fails."""
 
     STATE = {"parts": [Part]}
-    NOT_STATE = ("nets", "horizon", "part_index")
+    NOT_STATE = ("nets", "horizon", "part_index", "pushed")
 
     def __init__(
         self,
@@ -53,18 +55,34 @@ class WiredBoard(EmptyBoard):
         self.part_index = {part.name: index for index, part in enumerate(self.parts)}
         self.nets = Nets(netlist, self.parts)
         self.horizon = -1  # of the piece of a run that the CPU is in; -1 between two runs
+        self.pushed = [0xFF] * 4  # what the CPU was given of the ports
         EmptyBoard.__init__(self, spec, image, stop_on_fault, stop_at, stop_at_end)
+        self.nets.ports_changed = 0xF  # straps hold pins from the beginning
         self._supply(1, 0)
 
     # Time
 
     def _run(self, addresses: tuple[int, ...], until_tick: int) -> int:
+        faults = self.fault_count
         reason = EmptyBoard._run(self, addresses, until_tick)
         reached = self.cpu.cycles * CYCLE_TICKS if reason else until_tick
         self.sync(min(reached, until_tick) - 1)
-        return reason
+        return STOPPED if self.stop_on_fault and self.fault_count > faults else reason
 
     def _run_on(self, marks: tuple[int, ...], until_cycle: int) -> int:
+        cpu = self.cpu
+        cpu.stop_asleep = 0 if self.dead or self.held or not self.powered else 1
+        reason = self._go_on(marks, until_cycle)
+        cpu.stop_asleep = 0
+        return reason
+
+    def _sleep_on(self, until_cycle: int) -> None:
+        self._go_on((), until_cycle)
+
+    def _may_wake(self) -> bool:
+        return self.input_tick != NEVER_TICK or self.nets.part_count > 0
+
+    def _go_on(self, marks: tuple[int, ...], until_cycle: int) -> int:
         cpu = self.cpu
         if marks:
             cpu.mark(marks)
@@ -80,52 +98,79 @@ class WiredBoard(EmptyBoard):
     def _run_pieces(self, until_cycle: int) -> int:
         """In pieces that end at the next event of a part that may reach a port pin."""
         cpu = self.cpu
+        faults = self.fault_count
         while cpu.cycles < until_cycle:
-            due = self.nets.reach_tick()
-            stop_cycle = min(until_cycle, (due + 2) // CYCLE_TICKS)
+            due = self.nets.reach_tick
+            due_cycle = (due + 2) // CYCLE_TICKS  # the first whose S5P2 is not before it
             self.horizon = due
-            reason = cpu.go_on(stop_cycle)
+            if due_cycle <= cpu.cycles or self._is_before_write(due_cycle):
+                self.sync(due)
+                if self.stop_on_fault and self.fault_count > faults:
+                    return STOPPED
+                continue
+            # A cycle before it, too: whether the instruction there goes over it is known there.
+            stop_cycle = due_cycle if cpu.cycles == due_cycle - 1 else due_cycle - 1
+            reason = cpu.go_on(min(until_cycle, stop_cycle))
             if reason != 0 and (reason != REPLAN or self.again):
                 return reason
-            if reason == 0 and stop_cycle < until_cycle:
-                self.sync(due)
         return 0
+
+    def _is_before_write(self, due_cycle: int) -> bool:
+        """Whether the pins of `due_cycle` are sampled within the next instruction, which may write a register after.
+
+        What the pins do then has to be known first: a flag that they set may be cleared by that instruction.
+        """
+        return self.cpu.cycles == due_cycle - 1 and _TWO_CYCLES[self.cpu.code_at(self.cpu.pc)] != 0
+
+    def _step(self) -> None:
+        if self._is_before_write((self.nets.reach_tick + 2) // CYCLE_TICKS):
+            self.sync(self.nets.reach_tick)
+        self.cpu.step()
 
     def sync(self, tick: int) -> None:
         """Does all that parts have to do by themselves up to and including `tick`."""
-        now = self.nets.next_tick()
-        while now <= tick:
-            self.nets.due(now)
+        nets = self.nets
+        while nets.next_tick <= tick:
+            now = nets.next_tick
+            nets.due(now)
             self._push(now)
-            now = self.nets.next_tick()
 
     def _push(self, tick: int) -> None:
-        """What has changed on the nets, to the port pins; and whether the CPU has to look up earlier for the parts."""
+        """The tick is over: to the CPU what has changed on its pins, and when it has to look up for the parts."""
         nets = self.nets
-        for port in range(4):
-            if nets.take_external(port):
-                self.cpu.set_external(port, nets.external[port], tick)
-        if nets.new_contention >= 0:
-            net, nets.new_contention = nets.new_contention, -1
-            self._note(_CONTENTION, f"net {nets.names[net]}: {' and '.join(nets.drivers(net))}", tick)
+        if nets.ports_changed:
+            for port in range(4):
+                if nets.external[port] != self.pushed[port]:
+                    self.pushed[port] = nets.external[port]
+                    self.cpu.set_external(port, self.pushed[port], tick)
+            nets.ports_changed = 0
+        if nets.suspect_count and not self.forced:
+            self._judge(tick)
         if nets.faults:
             self._note_faults(tick)
-        if self.horizon >= 0:
-            due = nets.reach_tick()
-            if due < self.horizon:
-                self.horizon = due
-                self.cpu.replan()
+        if nets.reach_tick < self.horizon:
+            self.horizon = nets.reach_tick
+            self.cpu.replan()
 
     # From the processor
 
     def port_written(self, port: int, latch: int, tick: int) -> None:
         nets = self.nets
-        if (nets.latches[port] ^ latch) & nets.wired[port]:
-            self.sync(tick)
-            nets.write_port(port, latch, tick)
-            self._push(tick)
-        else:
+        if not (nets.latches[port] ^ latch) & nets.live[port]:
             nets.latches[port] = latch
+            return
+        if nets.next_tick <= tick:
+            self.sync(tick - 1)
+            if nets.next_tick == tick:  # what is there for no time is no contention: judged after the write
+                nets.due(tick)
+        nets.write_port(port, latch, tick)
+        self._push(tick)
+
+    def _judge(self, tick: int) -> None:
+        """Contention is a fault where it begins. RST and the supply move pins one after the other: judged after."""
+        for net in self.nets.judge():
+            detail = f"net {self.nets.names[net]}: {' and '.join(self.nets.drivers(net))}"
+            self._note_fault(_CONTENTION, self.cpu.at, tick, detail)
 
     def _note_faults(self, tick: int) -> None:
         """What parts have found on this tick: of several parts the first one's, where order and kind are the same."""
@@ -133,67 +178,81 @@ class WiredBoard(EmptyBoard):
         self.nets.faults = []
         before = None
         for fault in found:
-            if _order_and_kind(fault) != before:
-                self._note(fault[1], fault[2], tick)
+            if _order_and_kind(fault) != before and not self.forced:
+                self._note_fault(fault[1], self.cpu.at, tick, fault[2])
             before = _order_and_kind(fault)
-
-    def _note(self, kind: int, detail: str, tick: int) -> None:
-        """A fault, but while RST or the supply move pins."""
-        if self.forced:
-            return
-        self.fault_count += 1
-        pc = self.cpu.at
-        self.log.note(FAULT, tick, kind, pc)
-        if len(self.faults) < _FAULTS_KEPT:
-            symbol = self.image.symbols.name_at(pc)
-            self.faults.append(FirmwareFault(FaultKind(kind), tick, pc, symbol, detail))
-        if self.stop_on_fault:
-            self.cpu.request_stop()
 
     # Tests
 
-    def put(self, name: str, key: str, value: Any, tick: int) -> None:
-        """A test puts a value of a part, between two instructions, before all else at `tick`. Raises PluginError."""
+    def put(self, name: str, key: str, value: Any, tick: int) -> int:
+        """A test puts a value of a part, between two instructions, before all else at `tick`.
+
+        Returns 0, or STOPPED for a fault at which a run stops. Raises PluginError for a part that fails.
+        """
+        faults = self.fault_count
         tick = max(tick, self.cpu.cycles * CYCLE_TICKS)
         self.sync(tick - 1)
         index = self.part_index[name]
         part: Part = self.parts[index]
         try:
             part.put(key, value, tick)
+            if not self.powered:
+                part.supply(0, tick)
         except (Exception, SystemExit) as error:
             place = f"part {name!r} ({part.keys.name}), tick {tick}: put {key}"
             raise PluginError(f"{place}: {raised(error)}", "repair the part") from error
-        self.nets.call(index, tick)
+        self.nets.collect(index, tick)
+        self.nets.settle(tick)
         self._push(tick)
+        return STOPPED if self.stop_on_fault and self.fault_count > faults else 0
 
     def value(self, name: str, key: str) -> float | int | bool | str:
         """A value of a part as it is now. Raises PluginError for NaN, and for a part that fails."""
         part: Part = self.parts[self.part_index[name]]
-        place = f"part {name!r} ({part.keys.name}), value {key}"
+        place = f"part {name!r} ({part.keys.name}), tick {self.cpu.cycles * CYCLE_TICKS}, value {key}"
         try:
             value = part.read(key, min(self.cpu.cycles * CYCLE_TICKS, part.next_tick))
         except (Exception, SystemExit) as error:
             raise PluginError(f"{place}: {raised(error)}", "repair the part") from error
+        if not isinstance(value, float | int | str):
+            raise PluginError(f"{place}: is {type(value).__name__}", "return a number, a text or a boolean")
         if value != value:
             raise PluginError(f"{place}: is NaN", "repair the part")
         return value
 
-    # Supply
+    # RST and supply
+
+    def set_reset(self, level: int) -> None:
+        EmptyBoard.set_reset(self, level)
+        self._push(self.cpu.cycles * CYCLE_TICKS)
 
     def set_power(self, on: int) -> None:
-        if on != self.powered:
-            EmptyBoard.set_power(self, on)
-            self.forced = 1
-            self._supply(on, self.cpu.cycles * CYCLE_TICKS)
-            self.forced = 0
+        """The parts lose their supply before the processor does, and have it after it."""
+        if on == self.powered:
+            return
+        tick = self.cpu.cycles * CYCLE_TICKS
+        if not on:
+            self._supply(0, tick)
+        EmptyBoard.set_power(self, on)
+        if on:
+            self._supply(1, tick)
+        self._push(tick)
 
     def _supply(self, on: int, tick: int) -> None:
         """All parts begin, or stand; then the levels that they and the ports make."""
         self.sync(tick - 1)
+        nets = self.nets
+        nets.powered = on
+        nets.show_all()
+        nets.ports_changed = 0xF
         for index, part in enumerate(self.parts):
-            part.supply(on, tick)
-            self.nets.collect(index, tick)
-        self.nets.settle(tick)
+            try:
+                part.supply(on, tick)
+            except (Exception, SystemExit) as error:
+                place = f"part {part.name!r} ({part.keys.name}), tick {tick}: {'start' if on else 'supply'}"
+                raise PluginError(f"{place}: {raised(error)}", "repair the part") from error
+            nets.collect(index, tick)
+        nets.settle(tick)
         self._push(tick)
 
     # State
@@ -207,7 +266,10 @@ class WiredBoard(EmptyBoard):
                 raise ValueError(f"part {part.name} has its next event at tick {part.next_tick}")
         for port in range(4):
             self.nets.latches[port] = self.cpu.peripherals.ports.latches[port]
+        self.nets.powered = self.powered
         self.nets.restart()
+        for port in range(4):
+            self.pushed[port] = self.nets.external[port]
 
     def __repr__(self) -> str:
         return f"WiredBoard({self.spec.name}, cycle={self.cpu.cycles}, pc={self.cpu.pc:04X}h, parts={len(self.parts)})"

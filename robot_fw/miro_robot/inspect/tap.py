@@ -13,7 +13,7 @@ from miro_robot.board import Board
 from miro_robot.inspect.watcher import Watcher
 from miro_robot.mcs51.cpu import Cpu
 from miro_robot.mcs51.line import Line
-from miro_robot.parts.nets import Nets
+from miro_robot.parts.nets import Nets, Observer
 from miro_robot.probe import Probe
 from miro_robot.processor_board import ProcessorBoard
 from miro_robot.wired_board import WiredBoard
@@ -162,7 +162,7 @@ class NetTap:
     def __init__(self, nets: Nets, events: list[tuple[int, int, int]]) -> None:
         self.nets = nets
         self.events = events
-        self.edges: list[tuple[int, int, int]] = []
+        self.observer = Observer(range(nets.count))
         self.outside = [0xFF] * 4
         self.port_pins: list[list[int]] = [[] for _ in range(nets.count)]  # 8 * port + bit, by net
         for number, net in enumerate(nets.netlist.ports):
@@ -170,31 +170,26 @@ class NetTap:
                 self.port_pins[net].append(number)
 
     def attach(self) -> list[int]:
-        """Records from now on; the levels of the nets. Raises ValueError if something else records them."""
-        if self.nets.edges is not None:
-            raise ValueError("the nets of this board are watched already; close that waveform first")
-        self.nets.edges = self.edges
+        """Records from now on; the levels of the nets."""
+        self.nets.observe(self.observer)
         for net in range(self.nets.count):
-            self.nets.watch(net, 1)
             self._put_on_ports(net, self.nets.levels[net])
         return list(self.nets.levels[: self.nets.count])
 
     def detach(self) -> None:
-        self.nets.edges = None
-        for net in range(self.nets.count):
-            self.nets.watch(net, 0)
+        self.nets.ignore(self.observer)
 
     def known(self) -> int:
         """The tick below which all edges have been noted: no part has an event before."""
-        return self.nets.next_tick()
+        return self.nets.next_tick
 
     def take(self) -> None:
         """Moves what was recorded to `events`."""
-        for tick, net, level in self.edges:
+        for tick, net, level in self.observer.edges:
             self.events.append((tick, _PLACES + net, level))
             for port in self._put_on_ports(net, level):
                 self.events.append((tick, _OUTSIDE + port, self.outside[port]))
-        self.edges.clear()
+        self.observer.edges.clear()
 
     def _put_on_ports(self, net: int, level: int) -> list[int]:
         """The ports on which `outside` changes."""

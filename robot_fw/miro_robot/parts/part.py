@@ -20,7 +20,7 @@ from typing import Any
 
 from miro_exact.clock import NEVER_TICK
 from miro_exact.state import TICK
-from miro_robot.parts.keys import MOST_PINS, RELEASED, PartKeys, Place
+from miro_robot.parts.keys import IN, LOW, MOST_PINS, RELEASED, STRONG, TWO_WAY, PartKeys, Place
 
 _NEVER = NEVER_TICK
 
@@ -35,7 +35,7 @@ class Part:
 
     STATE: dict[str, Any] = {"next_tick": TICK, "reach_tick": TICK, "drives": ("32B", 0, 2)}
     NOT_STATE: tuple[str, ...] = (
-        *("keys", "place", "name", "crystal_hz", "continuous", "senses_drive"),
+        *("keys", "place", "name", "crystal_hz", "continuous", "senses_drive", "low_pins", "high_pins"),
         *("levels", "outside", "driven", "pending", "wanted", "moved"),  # follow from the drives of all
         "faults",  # the board takes them at once
     )
@@ -60,6 +60,10 @@ class Part:
         self.outside = self.levels
         self.pending = 0  # pins that have changed since the last call
         self.moved = 0  # pins that the part has driven since the last wave
+        self.low_pins = self.high_pins = 0  # pins that it may drive low, .. high
+        for number, pin in enumerate(keys.PINS):
+            self.low_pins |= int(pin.kind != IN) << number
+            self.high_pins |= int(pin.kind in (STRONG, TWO_WAY)) << number
         self.wanted = [RELEASED] * 32
         self.drives = [RELEASED] * 32
         self.faults: list[tuple[int, int, str]] = []  # order, kind, detail: since the last call
@@ -79,7 +83,16 @@ class Part:
         return self.driven >> pin & 1
 
     def drive(self, pin: int, level: int) -> None:
-        """From the tick of this call on the part drives `pin` LOW or HIGH, or has RELEASED it."""
+        """From the tick of this call on the part drives `pin` LOW or HIGH, or has RELEASED it.
+
+        Raises ValueError for a pin or a level that the part does not have.
+        """
+        if pin < 0 or pin >= MOST_PINS or level < LOW or level > RELEASED:
+            raise ValueError(f"drives pin {pin} to level {level}, which does not exist")
+        if level != RELEASED and not (self.high_pins if level else self.low_pins) >> pin & 1:
+            raise ValueError(
+                f"drives its pin {self._named(pin)} {'high' if level else 'low'}, which it cannot"
+            )
         if self.wanted[pin] != level:
             self.wanted[pin] = level
             self.moved |= 1 << pin
@@ -91,6 +104,9 @@ class Part:
         lower order come first.
         """
         self.faults.append((order, kind, detail))
+
+    def _named(self, pin: int) -> str:
+        return self.keys.PINS[pin].name if pin < len(self.keys.PINS) else str(pin)
 
     def ticks(self, us: float) -> int:
         """Microseconds to ticks, rounded half up."""
