@@ -1,7 +1,7 @@
 cimport cython
 from miro_robot.parts.part cimport Part
 
-cdef double _SHORTEST_US, _LONGEST_US, _HOLD_US
+cdef double _HOLD_US
 
 cdef class ServoPart(Part):
     cdef readonly long long shortest_ticks, longest_ticks, hold_ticks

@@ -1,6 +1,6 @@
 """A hobby servo: the length of a pulse says to which angle it turns.
 
-pin  |~~|_________________|~~~|______    0.5 ms: 0 degrees .. 2.5 ms: 180 degrees
+pwm  |~~|_________________|~~~|______    0.5 ms: 0 degrees .. 2.5 ms: 180 degrees
      |<->| pulse                         between two pulses the shaft moves on towards the angle, as fast as it can
      |<--- frame, 20 ms ->|
 """
@@ -27,7 +27,7 @@ class Servo(PartKeys, frozen=True, kw_only=True, tag="servo"):
     such pulses and as long as 50 ms. It begins in the middle.
     """
 
-    PINS = (Pin("pin", IN),)
+    PINS = (Pin("pwm", IN),)
     READS = {
         "angle_deg": "where it is",
         "target_deg": "where it goes to, by the last pulse that counted",

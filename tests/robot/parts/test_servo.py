@@ -12,7 +12,7 @@ MS = 12_000
 
 
 def bench(crystal_hz=12_000_000, **keys):
-    board = Bench({"neck": (Servo(**keys), {"pin": "net"})}, ["net"], crystal_hz)
+    board = Bench({"neck": (Servo(**keys), {"pwm": "net"})}, ["net"], crystal_hz)
     board.drive("net", 0)
     board.run(1)
     return board
