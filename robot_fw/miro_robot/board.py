@@ -1,7 +1,7 @@
 """The robot's board: one AT89C52, two LM629, the L298 inputs, wired as a board file says.
 
                  P0 ------- D7-D0 -----------+-------------+
-    AT89C52      P2.0-2.4 - PS /RD /WR /CS --+-------------+        the MIRO's wiring (boards/miro.toml)
+    AT89C52      P2.0-2.4 - PS /RD /WR /CS --+-------------+        the MIRO's wiring (boards/miro.board.toml)
                  P2.5 ----- /RST ------------+-------------+
                                         LM629 left    LM629 right
                  P3.2 /INT0 <-- NOT <------- HI            |

@@ -4,7 +4,7 @@ import re
 import tomllib
 from pathlib import Path
 
-from miro_robot.wiring import load_wiring
+from miro_sim.scenario.board_file import board_of_table
 from miro_sim.scenario.file import load
 from mirotwin.verify.checks.expect import expectations_of
 from mirotwin.verify.steps.reading import steps_of
@@ -62,9 +62,8 @@ def toml(example):
     if "project" in found:
         groups = [name.removeprefix("mirotwin.") for name in found["project"]["entry-points"]]
         return f"no such entry points: {groups}" if set(groups) - set(GROUPS) else None
-    if "nets" in found:
-        Path("block.board.toml").write_text(text, "utf-8")
-        load_wiring(Path("block.board.toml"))
+    if "crystal_hz" in found:
+        board_of_table(found, "block.board.toml")
     elif "seeds" in found:
         from mirotwin import campaign
 

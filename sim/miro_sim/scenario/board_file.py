@@ -29,6 +29,7 @@ from miro_robot.board_spec import (
 )  # fmt: skip
 from miro_robot.parts.keys import MOST_PINS, PartKeys, Pin
 from miro_robot.parts.resolve import NAME, BoardError, resolve
+from miro_robot.wiring import check_no_wiring
 from miro_sim.scenario.base import is_path
 from miro_sim.scenario.errors import choices_of, explained, value_at
 from miro_sim.scenario.file import decode
@@ -37,8 +38,6 @@ from miro_sim.scenario.parts import PARTS
 ENDING = ".board.toml"
 _BUILTIN = Path(miro_robot.boards.__file__).parent
 _FASTEST_BIT_TICKS = 32
-_OF_WIRING = ("data", "latch", "buffer")
-"""Keys of wiring files, which named the inputs of two LM629 with what drives them."""
 MOST_PART_PINS = MOST_PINS - 2
 
 _REMEDIES = {
@@ -124,14 +123,6 @@ def board_of_table(table: dict[str, Any], origin: str, name: str = "board") -> B
         except (Exception, SystemExit) as error:  # of a part that another distribution brought
             raise BoardError("", "parts", f"cannot be wired: {raised(error)}", "repair the part") from error
         return spec
-
-
-def check_no_wiring(table: dict[str, Any]) -> None:
-    """Refuses a wiring file of before. Raises BoardError."""
-    for key in _OF_WIRING:
-        if key in table:
-            what = "this is a wiring file of before, not a board file"
-            raise BoardError("", key, what, "write its parts as `mirotwin boards show miro` does")
 
 
 def _read(table: dict[str, Any], struct: type[_T]) -> _T:

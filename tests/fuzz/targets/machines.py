@@ -1,10 +1,14 @@
 """What a machine is given beside its firmware: levels on pins, serial input with conditions, a board file."""
 
+from contextlib import suppress
+
 from miro_exact.bad_input import BadInput
 from miro_robot.board import Board
 from miro_robot.image import load_hex
+from miro_robot.parts.resolve import resolve
 from miro_robot.plant import IdealWheels
 from miro_robot.wiring import WiringError, load_wiring
+from miro_sim.scenario.board_file import load_board
 from miro_sim.scenario.terminal import InputPiece, PinEvent, read_pins
 from tests.alone import Alone
 from tests.fuzz.target import Draws, Target, always, folder, refused
@@ -79,6 +83,8 @@ def _board():
 
     def run(data):
         path.write_bytes(data)
+        with suppress(BadInput):  # also where the fast board cannot be it
+            resolve(load_board(f"{path}"))
         try:
             wiring = load_wiring(path)
         except WiringError as error:
@@ -102,6 +108,8 @@ TARGETS = {
     "board": Target(
         "board files, and the board that comes of one",
         _board,
-        words=b"[[latch]]\n|[[buffer]]\n|address = |mask = |initial = |slot.0|CTRL.0|P3.6".split(b"|"),
+        words=b"[latches.OUT]\n|[buffers.IN]\n|address = |mask = |initial = |CTRL.0|P3.6|left.hi|!".split(
+            b"|"
+        ),
     ),
 }

@@ -40,7 +40,7 @@ def test_a_scenario_its_base_and_a_campaign_run(mirotwin, tmp_path):
 
 
 def test_a_board_and_a_calibration_are_read(tmp_path):
-    miro = Path(load_wiring.__code__.co_filename).with_name("boards") / "miro.toml"
+    miro = Path(load_wiring.__code__.co_filename).with_name("boards") / "miro.board.toml"
     assert load_wiring(windows(tmp_path / "board.toml", miro.read_text())) == load_wiring()
     path = windows(tmp_path / "eye.toml", "a = 1\n")
     assert parse_eye(text_of(path), dict[str, int], f"{path}") == {"a": 1}

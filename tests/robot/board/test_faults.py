@@ -83,7 +83,8 @@ def test_a_fault_names_kind_tick_instruction_and_symbol(what):
 
 
 def test_every_kind_is_provoked():
-    assert {kind for _, (kind, *_) in CASES.values()} == set(FaultKind)
+    of_parts = {FaultKind.NET_CONTENTION}  # of a board with parts on nets
+    assert {kind for _, (kind, *_) in CASES.values()} == set(FaultKind) - of_parts
 
 
 def test_a_fault_reads_as_a_sentence():

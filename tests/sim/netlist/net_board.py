@@ -9,30 +9,14 @@ import msgspec
 from miro_exact import state
 from miro_exact.clock import CYCLE_TICKS
 from miro_robot.board import MAIN_LOOP_LIMIT_CYCLES, Board
-from miro_robot.board_spec import BoardSpec, PartSpec, StrapSpec
 from miro_robot.build import parts_of
 from miro_robot.lm629.options import Lm629Options
 from miro_robot.parts.lm629 import Lm629Keys
 from miro_robot.parts.resolve import resolve
 from miro_robot.wired_board import WiredBoard
-from miro_sim.plant.differential_drive import Drive
+from miro_sim.scenario.board_file import load_board
 
-_SIDES = {"left": ("P2.3", "P3.2", "en_a", "in1", "in2"), "right": ("P2.4", "P3.3", "en_b", "in3", "in4")}
-
-
-def miro():
-    """MIRO's board as a file would say it."""
-    parts, drive = {}, {}
-    for side, (select, interrupt, enable, forward, backward) in _SIDES.items():
-        pins = {f"d{bit}": f"P0.{bit}" for bit in range(8)}
-        pins |= {"ps": "P2.0", "rd": "P2.1", "wr": "P2.2", "cs": select, "rst": "P2.5", "hi": f"!{interrupt}"}
-        pins |= {"a": f"drive.{side}_a", "b": f"drive.{side}_b"}
-        parts[side] = PartSpec(keys=Lm629Keys(), pins=pins)
-        drive |= {enable: f"{side}.mag", forward: f"!{side}.sign", backward: f"{side}.sign"}
-    parts["drive"] = PartSpec(keys=Drive(), pins=drive)
-    straps = {f"slot{bit}": StrapSpec(pin=f"P1.{bit}", level=0) for bit in range(3)}
-    straps["three"] = StrapSpec(pin="P1.3")
-    return BoardSpec(name="miro", xram="none", pull_ups=("P0",), parts=parts, straps=straps)
+_SIDES = ("left", "right")
 
 
 def strapped(spec, slot, robots, options):
@@ -50,7 +34,7 @@ class NetBoard(WiredBoard):
     """What `Board` is with the same `plant`, `slot`, .. and options."""
 
     def __init__(self, plant, slot=0, robots=3, options=None, stop_on_fault=True, *, image, spec=None):
-        spec = strapped(spec or miro(), slot, robots, options)
+        spec = strapped(spec or load_board("miro"), slot, robots, options)
         netlist = resolve(spec)
         parts = parts_of(spec, netlist, 0)
         by_name = dict(zip(spec.parts, parts, strict=True))
