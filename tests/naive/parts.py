@@ -67,20 +67,27 @@ def pwm(directions, longest):
     since = directions[:1]
     seen = (float(directions[0]), 0)
     for direction in directions[1:]:
-        since.append(direction)
-        edges = [tick for tick in range(1, len(since)) if since[tick] != since[tick - 1]]
-        periods = [
-            (end, begin)
-            for way in (-1, 1)
-            for begin, end in pairwise(tick for tick in edges if since[tick] == way)
-        ]
-        end, begin = max(periods, default=(0, 0))
+        edges, (end, begin) = edges_of(since)
         period = end - begin
-        if edges and len(since) - 1 - edges[-1] >= min(longest, 2 * period or longest):
-            since = [direction]
-            seen = (float(direction), 0)
+        # It is constant from a tick on, and changes on the same one, if both come together.
+        if edges and len(since) - edges[-1] >= min(longest, 2 * period or longest):
+            seen = (float(since[-1]), 0)
+            since = since[-1:]
         elif not edges:
-            since = [direction]
-        elif period:
-            seen = (sum(since[begin:end]) / period, period)
+            since = since[-1:]
+        since.append(direction)
+        end, begin = edges_of(since)[1]
+        if end > begin:
+            seen = (sum(since[begin:end]) / (end - begin), end - begin)
     return seen
+
+
+def edges_of(directions):
+    """The ticks of changes, and (end, begin) of the last period: from one begin of driving to the next the same way."""
+    edges = [tick for tick in range(1, len(directions)) if directions[tick] != directions[tick - 1]]
+    periods = [
+        (end, begin)
+        for way in (-1, 1)
+        for begin, end in pairwise(tick for tick in edges if directions[tick] == way)
+    ]
+    return edges, max(periods, default=(0, 0))

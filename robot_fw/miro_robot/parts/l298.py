@@ -22,6 +22,7 @@ from miro_robot.parts.part import Part
 _NEVER = 1 << 62
 _COAST, _BRAKE, _FORWARD, _BACKWARD = range(4)
 _MODES = ("coast", "brake", "forward", "backward")
+_ALL = 0x3F  # inputs
 _EN_A, _EN_B, _OUT_1, _OUT_3 = 0, 3, 6, 8  # pins; the inputs follow their enable, the outputs each other
 
 
@@ -46,13 +47,13 @@ class L298(PartKeys, frozen=True, kw_only=True, tag="l298"):
         *(Pin(f"out{number}", STRONG, optional=True) for number in range(1, 5)),
     )
     READS = {
-        f"{channel}.{key}": meaning
+        f"{channel}.{key}": words
         for channel in "ab"
-        for key, meaning in (
-            ("duty", "-1 to 1, backward below 0, over the last PWM period"),
-            ("frequency_hz", "of the PWM; 0 without one"),
-            ("mode", "coast, brake, forward or backward, now"),
-        )
+        for key, words in {
+            "duty": "-1 to 1, backward below 0, over the last PWM period",
+            "frequency_hz": "of the PWM; 0 without one",
+            "mode": "coast, brake, forward or backward, now",
+        }.items()
     }
     SHEET = (
         "ST L298 data sheet, DS0218: pin functions, 'Input stage', figure 6 (bidirectional DC motor control)"
@@ -74,13 +75,14 @@ class L293d(L298, frozen=True, kw_only=True, tag="l293d"):
 class Channel:
     """What one channel drives, and the share of a PWM period in which it did.
 
-    `driven_ticks`: forward less backward, up to `edge_tick`, the last change. `begun_ticks`, `begun_driven`: when it
-    last began to drive backward, and forward, and `driven_ticks` then; -1: not since it was constant. `last_ticks`,
-    `last_driven`: of the last period; 0 while the level counts as constant, and is `steady`. It will at `still_tick`.
+    `direction`: 1 forward, -1 backward, 0 neither, since `edge_tick`. `driven_ticks`: forward less backward up to then.
+    `begun_ticks`, `begun_driven`: when it last began to drive backward, and forward, and `driven_ticks` then; -1: not
+    since the level was constant. `last_ticks`, `last_driven`: of the last period; 0 while the level counts as constant,
+    and is `steady`. It will at `still_tick`.
     """
 
     STATE = {
-        "mode": ("i", 0, len(_MODES) - 1),
+        "direction": ("i", -1, 1),
         "steady": ("i", -1, 1),
         "edge_tick": TICK,
         "driven_ticks": ("q", -_NEVER, _NEVER),
@@ -94,40 +96,25 @@ class Channel:
 
     def __init__(self, longest_ticks: int) -> None:
         self.longest_ticks = longest_ticks
+        self.edge_tick = self.driven_ticks = 0
         self.begun_ticks = [-1] * 2
         self.begun_driven = [0] * 2
-        self.begin(_COAST, 0)
+        self.settle(0)
 
-    def begin(self, mode: int, tick: int) -> None:
-        """A constant level, as if it had been for ever."""
-        self.mode = mode
-        self.edge_tick = tick
-        self.driven_ticks = 0
-        self.settle()
-
-    def settle(self) -> None:
+    def settle(self, direction: int) -> None:
         """The level counts as constant."""
-        self.steady = self.direction()
+        self.direction = self.steady = direction
         self.begun_ticks[0] = self.begun_ticks[1] = -1
-        self.begun_driven[0] = self.begun_driven[1] = 0
         self.last_ticks = self.last_driven = 0
         self.still_tick = _NEVER
 
-    def direction(self) -> int:
-        return 1 if self.mode == _FORWARD else -1 if self.mode == _BACKWARD else 0
-
-    def change(self, mode: int, tick: int) -> None:
-        """From `tick` on another mode."""
-        before = self.direction()
-        self.mode = mode
-        if self.direction() != before:
-            self._turn(before, self.direction(), tick)
-
-    def _turn(self, before: int, after: int, tick: int) -> None:
-        self.driven_ticks += before * (tick - self.edge_tick)
+    def turn(self, direction: int, tick: int) -> None:
+        """From `tick` on it drives another way."""
+        self.driven_ticks += self.direction * (tick - self.edge_tick)
         self.edge_tick = tick
-        if after != 0:
-            self._begin_period(1 if after > 0 else 0, tick)
+        self.direction = direction
+        if direction != 0:
+            self._begin_period(1 if direction > 0 else 0, tick)
         wait = self.longest_ticks
         if self.last_ticks > 0:
             wait = min(wait, 2 * self.last_ticks)
@@ -141,9 +128,7 @@ class Channel:
         self.begun_driven[way] = self.driven_ticks
 
     def duty(self) -> float:
-        if self.last_ticks > 0:
-            return self.last_driven / self.last_ticks
-        return self.steady
+        return self.last_driven / self.last_ticks if self.last_ticks > 0 else 1.0 * self.steady
 
 
 class L298Part(Part):
@@ -165,37 +150,38 @@ class L298Part(Part):
 
     def supply(self, on: int, tick: int) -> None:
         self.is_on = on
-        for channel in range(2):
-            one: Channel = self.channels[channel]
-            one.begin(self._mode(channel), tick)
-            self._drive(channel, one.mode)
+        self.changed(_ALL, tick)
+        for one in self.channels:
+            one.settle(one.direction)
         self.next_tick = _NEVER
+
+    def changed(self, pins: int, tick: int) -> None:
+        for channel in range(2):
+            if pins >> (_EN_B if channel else _EN_A) & 7:
+                self._follow(channel, tick)
+        self._plan()
+
+    def _follow(self, channel: int, tick: int) -> None:
+        """Outputs as the inputs say."""
+        mode = self._mode(channel)
+        direction = (mode == _FORWARD) - (mode == _BACKWARD)
+        one: Channel = self.channels[channel]
+        if direction != one.direction:
+            one.turn(direction, tick)
+        for number in range(2):
+            level = self.level((_EN_B if channel else _EN_A) + 1 + number)
+            self.drive((_OUT_3 if channel else _OUT_1) + number, RELEASED if mode == _COAST else level)
 
     def _mode(self, channel: int) -> int:
         inputs = self.levels >> (_EN_B if channel else _EN_A) & 7  # enable lowest
         number = 8 * channel + 4 * (inputs & 1) + (inputs >> 1)
         return self.modes[number] if self.is_on else _COAST
 
-    def _drive(self, channel: int, mode: int) -> None:
-        first = (_EN_B if channel else _EN_A) + 1
-        for number in range(2):
-            level = RELEASED if mode == _COAST else self.level(first + number)
-            self.drive((_OUT_3 if channel else _OUT_1) + number, level)
-
-    def changed(self, pins: int, tick: int) -> None:
-        for channel in range(2):
-            if pins >> (_EN_B if channel else _EN_A) & 7:
-                one: Channel = self.channels[channel]
-                mode = self._mode(channel)
-                one.change(mode, tick)
-                self._drive(channel, mode)
-        self._plan()
-
     def due(self, tick: int) -> None:
         for channel in range(2):
             one: Channel = self.channels[channel]
             if one.still_tick <= tick:
-                one.settle()
+                one.settle(one.direction)
         self._plan()
 
     def _plan(self) -> None:
@@ -204,10 +190,10 @@ class L298Part(Part):
         self.next_tick = min(a.still_tick, b.still_tick)
 
     def read(self, name: str, tick: int) -> float | int | bool | str:
-        channel, _, key = name.partition(".")
-        one: Channel = self.channels["ab".index(channel)]
-        if key == "mode":
-            return _MODES[one.mode]
-        if key == "duty":
+        channel = "ab".index(name[0])
+        one: Channel = self.channels[channel]
+        if name.endswith("mode"):
+            return _MODES[self._mode(channel)]
+        if name.endswith("duty"):
             return one.duty()
         return self.crystal_hz / one.last_ticks if one.last_ticks > 0 else 0.0

@@ -5,7 +5,9 @@ from miro_robot.parts import ELECTRONICS
 from miro_robot.parts.keys import PartKeys
 
 MOVING: dict[str, str] = {
+    "dc_motor": "miro_sim.plant.dc_motor:DcMotor",
     "differential_drive": "miro_sim.plant.differential_drive:Drive",
+    "encoder": "miro_sim.plant.encoder:Encoder",
 }
 """Parts that move: name to the struct of its keys, in `miro_sim.plant`."""
 PARTS: Registry[PartKeys] = Registry(

@@ -79,6 +79,8 @@ class Bench:
         self._supply(1)
 
     def _supply(self, on):
+        self.nets.powered = on
+        self.nets.show_all()
         for index, part in enumerate(self.parts):
             part.supply(on, self.tick)
             self.nets.collect(index, self.tick)
