@@ -13,12 +13,13 @@ from miro_exact.bad_input import BadInput, encodable
 from miro_exact.domain import DomainError
 from miro_exact.plugins import PluginError
 from miro_robot.image import Image
-from miro_sim.scenario.file import ScenarioText, load
+from miro_sim.scenario.board_scenario import AnyText, BoardText, load_any
 from miro_sim.world.machine import NotObservable
 from mirotwin.desk.guard import DeskOptions
 from mirotwin.runs.result import Result
 from mirotwin.runs.run import Run
 from mirotwin.runs.spec import RunSpec
+from mirotwin.shell.firmware_image import image_for
 from mirotwin.verify.cases.artifacts import clear, leave, nothing_left, report_line, stream_files
 from mirotwin.verify.cases.case import SUFFIX as CASE_SUFFIX
 from mirotwin.verify.cases.case import is_case
@@ -31,7 +32,7 @@ SCENARIO = "scenario.toml"
 
 def run_test(
     path: str,
-    image: Image,
+    firmware: Image | str | None = None,
     seed: int = 0,
     settings: Sequence[str] = (),
     artifacts: Path | None = None,
@@ -40,6 +41,7 @@ def run_test(
 ) -> Result:
     """Runs a file to its verdict; whatever cannot be run is a result, too.
 
+    `firmware`: an image, or its path; default: the one that a board's scenario names, or the robot's own.
     `artifacts`: below it, in a folder of its own, the file leaves what `save` steps keep and, if it fails, its case; a
     file that saves needs one. `again`: makes the command that gives the verdict again, from whether the file saves.
     `desk`: the port of the robots that are tested, if not their twin.
@@ -49,7 +51,7 @@ def run_test(
         with suppress(OSError, BadInput):  # who leaves something there says why nothing can be left
             clear(folder, SCENARIO)
     try:
-        return _run(path, image, seed, settings, folder, again, desk)
+        return _run(path, firmware, seed, settings, folder, again, desk)
     except NotObservable as error:
         return Result(path=path, verdict="not observable", said=[("not observable", f"{error}")], seed=seed)
     except (DomainError, PluginError, OSError) as error:
@@ -64,16 +66,19 @@ def cannot_be_run(path: str, bad: BadInput, seed: int = 0, error: Exception | No
 
 def _run(
     path: str,
-    image: Image,
+    firmware: Image | str | None,
     seed: int,
     settings: Sequence[str],
     folder: Path | None,
     again: Callable[[bool], str],
     desk: DeskOptions | None,
 ) -> Result:
-    text = load(path, settings)
+    text = load_any(path, settings)
     expected, steps = expectations_in(text), steps_in(text)
+    image = firmware if isinstance(firmware, Image) else image_for(text, firmware)
     if desk is not None and desk.port:
+        if isinstance(text, BoardText):
+            raise BadInput(path, "--port", "is for robots, and this scenario is for a board", "leave it out")
         from mirotwin.runs.at_port import play_at_port  # loads pyserial
 
         return replace(play_at_port(text, steps, image, desk, folder), again=again(False))
@@ -94,7 +99,7 @@ def _run(
     return result if folder is None else _with_artifacts(run, case, result, folder, text)
 
 
-def _with_artifacts(run: Run, case: str | None, result: Result, folder: Path, text: ScenarioText) -> Result:
+def _with_artifacts(run: Run, case: str | None, result: Result, folder: Path, text: AnyText) -> Result:
     """The states of the `save` steps, and the case if it failed, are in the folder now."""
     failed = bool(result.lines)
     try:

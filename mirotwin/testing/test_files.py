@@ -16,7 +16,6 @@ from miro_exact.bad_input import BadInput
 from mirotwin.runs.job import load_stream
 from mirotwin.runs.result import Line, Result
 from mirotwin.runs.test_file import cannot_be_run, run_test
-from mirotwin.shell.firmware_image import load_firmware
 from mirotwin.testing.test_options import TestOptions
 from mirotwin.verify.cases.case import SUFFIX as CASE_SUFFIX
 from mirotwin.verify.cases.replay_line import replay_line
@@ -30,9 +29,9 @@ def run_file(options: TestOptions, file: str) -> Result:
 
 def _run_scenario(options: TestOptions, file: str) -> Result:
     """Runs a scenario file as a test: in the twin, or at a port."""
-    image, again = load_firmware(options.firmware), partial(options.line_for, file)
+    again = partial(options.line_for, file)
     settings = (*options.settings, *as_settings(options.expected))
-    result = run_test(file, image, options.seed, settings, options.artifacts, again, options.desk)
+    result = run_test(file, options.firmware, options.seed, settings, options.artifacts, again, options.desk)
     return replace(result, again=result.again or again())
 
 
