@@ -95,6 +95,8 @@ def _all(run: Sequence[Period], other: Sequence[Period], rule: CompareRule) -> I
                 for name, recorded, replayed in compare:
                     place = here.tick, here.index, robot.network, robot.slot
                     yield Difference(*place, name, recorded, replayed)
+    if rule.kind == "bits":
+        yield from _parts(run, other)
     if rule.digests and rule.kind == "bits":
         for here, there in zip(run, other, strict=True):
             if here.digest != there.digest:
@@ -121,6 +123,16 @@ def _values(robot: RobotPeriod, twin: RobotPeriod, rule: CompareRule) -> Named:
         for name in {**mine, **theirs}:
             if mine.get(name) != theirs.get(name):
                 yield name, mine.get(name), theirs.get(name)
+
+
+def _parts(run: Sequence[Period], other: Sequence[Period]) -> Iterator[Difference]:
+    """The values of parts of boards, where both runs have them."""
+    for here, there in zip(run, other, strict=True):
+        for parts, twins in zip(here.values, there.values, strict=False):
+            place = parts.tick, here.index, parts.network, -1
+            for path, value in parts.values.items():
+                if value != twins.values.get(path, value):
+                    yield Difference(*place, f"values {path}", value, twins.values[path])
 
 
 def _wheels(robot: RobotPeriod, twin: RobotPeriod, rule: CompareRule) -> Named:

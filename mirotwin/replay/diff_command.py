@@ -15,7 +15,7 @@ from miro_exact.inputs import RECORDING_BYTES, check_no_folder, read_input
 from miro_robot.image import FLASH_BYTES, SPACE_BYTES
 from miro_sim.periods import Period, RobotId
 from miro_sim.scenario.board import BoardScenario
-from miro_sim.scenario.file import load
+from miro_sim.scenario.board_scenario import BoardText, load_any
 from mirotwin.recording.compare import CompareRule
 from mirotwin.recording.reader import parse
 from mirotwin.recording.writer import MAGIC
@@ -31,7 +31,7 @@ from mirotwin.runs.spec import RunSpec
 from mirotwin.shell.command import Argument, Option, Options, command_line, command_of, operand
 from mirotwin.shell.console import show
 from mirotwin.shell.debug_files import LinesFrom, SourceFolders, checked_sources, load_images
-from mirotwin.shell.firmware_image import load_firmware
+from mirotwin.shell.firmware_image import image_for, load_firmware
 from mirotwin.shell.json_text import print_json
 from mirotwin.shell.options import (
     ALL,
@@ -151,10 +151,10 @@ def _is_image(path: str) -> bool:
 
 
 def _read_recordings(options: DiffOptions) -> tuple[ComparedRun, ComparedRun]:
-    return _read_recording(file_in(options.a)), _read_recording(file_in(options.b))
+    return _read_recording(file_in(options.a), options), _read_recording(file_in(options.b), options)
 
 
-def _read_recording(path: str) -> ComparedRun:
+def _read_recording(path: str, options: DiffOptions) -> ComparedRun:
     check_no_folder(path)
     data = read_input(path, prefix=MAGIC, prefix_limit=RECORDING_BYTES)
     if not MAGIC.startswith(data[: len(MAGIC)]):
@@ -169,6 +169,8 @@ def _read_recording(path: str) -> ComparedRun:
         raise BadInput(path, "", reason, "replay it, or compare recordings of whole runs")
     complain(*recording_notes(recording, path))
     sent = recorded_spec(recording, path)
+    if isinstance(sent.scenario, BoardScenario):
+        options.compare.refuse_of_robots(path)
     ways = replace(sent, computed=True), sent
     return ComparedRun(recording.periods, ways, True, source.state, source.plugins)
 
@@ -179,14 +181,15 @@ def _run_images(options: DiffOptions) -> tuple[ComparedRun, ComparedRun]:
         job = load_job(on, options.a, options.settings, options.seed)
         complain(*job.notes)
         spec, end_tick = job.spec, job.end_tick
-        if job.alone and options.compare.kind not in ("bits", "bytes"):
-            reason = f"is for robots, and {on} is for a board alone"
-            raise BadInput("", f"--compare {options.compare.kind}", reason, "compare bits or bytes")
+        if job.alone:
+            options.compare.refuse_of_robots(on)
     else:
-        text = load(on, options.settings)
+        text = load_any(on, options.settings)
         tell_notes(text.notes)
         refuse_steps(text.scenario, text.origin)
-        image, seed, end_tick = load_firmware(options.a), options.seed or 0, text.scenario.end_tick
+        if isinstance(text, BoardText):
+            options.compare.refuse_of_robots(on)
+        image, seed, end_tick = image_for(text, options.a), options.seed or 0, text.scenario.end_tick
         spec = RunSpec.of(text, image, seed)
     end_tick = min(end_tick, options.compare.rule(spec.scenario.clock).to_tick or end_tick)
     period_ticks = spec.scenario.period_ticks

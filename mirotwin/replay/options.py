@@ -109,6 +109,12 @@ class CompareOptions(Options, frozen=True, kw_only=True):
             to_tick=to_tick,
         )
 
+    def refuse_of_robots(self, file: str) -> None:
+        """Raises BadInput for a comparison that needs robots, where `file` is for a board alone."""
+        if self.kind not in ("bits", "bytes"):
+            reason = f"is for robots, and {file} is for a board alone"
+            raise BadInput("", f"--compare {self.kind}", reason, "compare bits or bytes")
+
     def of_answers(self, file: str) -> CompareRule:
         """The comparison of robots at a port. Raises BadInput for one that cannot be made there."""
         kind = self.given("kind") if self.kind != "answers" else []

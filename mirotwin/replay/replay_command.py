@@ -116,7 +116,7 @@ def replay(options: ReplayOptions) -> int:
     if options.compare.kind == "answers":
         reason = "is for robots at a port, and this was recorded at none"
         raise BadInput(file, "--compare answers", reason, "give --port, or another comparison")
-    if job.case.verdict or job.alone:
+    if job.case.verdict or (job.alone and not job.recorded):
         return _replay_case(job, options)
     return _compare_with_recorded(job, images, options)
 
@@ -150,7 +150,7 @@ def _loaded(file: str, options: ReplayOptions) -> tuple[Job, list[Image]]:
     job = load_job(file, options.firmware, keys, options.seed, options.stack_from)
     complain(*job.notes)
     if job.alone and options.desk.port:
-        raise BadInput(file, "--port", "is not for a case of a bare processor", "leave it out")
+        raise BadInput(file, "--port", "is for robots, and this is for a board", "leave it out")
     if not job.recorded and not options.desk.port:
         refuse_given(file, "a text stream holds nothing to compare with", options.given(*_OF_A_RECORDING))
     images = load_images(options.lines_from, job.image)
@@ -163,7 +163,10 @@ def _loaded(file: str, options: ReplayOptions) -> tuple[Job, list[Image]]:
 
 def _compare_with_recorded(job: Job, images: Sequence[Image], options: ReplayOptions) -> int:
     """Replays it; a stream has nothing to be compared with."""
-    compare, rule = options.compare, options.compare.rule()
+    compare, scenario = options.compare, job.spec.scenario
+    rule = replace(compare.rule(scenario.clock), period_ticks=scenario.period_ticks)
+    if job.alone:
+        compare.refuse_of_robots(job.spec.origin)
     to_tick = rule.to_tick
     if job.recorded:
         check_reaches(rule, job.spec.origin, job.recorded)
@@ -181,12 +184,13 @@ def _compare_with_recorded(job: Job, images: Sequence[Image], options: ReplayOpt
     result = again.result()
     ended = len(again.periods) < len(recorded)
     if options.shows:
-        show(*frame_tables(job, again.periods, options.everything, to_tick))
+        if not job.alone:
+            show(*frame_tables(job, again.periods, options.everything, to_tick))
         show(*difference_tables(difference, options.everything))
     if not job.recorded and not compare.as_json:
         show(response_table(again.periods))
     complain(*result.texts)
-    if options.shows and says_anything(job.spec.robot_scenario):
+    if options.shows and says_anything(job.spec.scenario):
         show(expectations_text(result.expectations))
     complain(*difference_lines(difference, "the replay differs"), *difference.notes)
     if difference.differences and options.shows:
@@ -194,7 +198,12 @@ def _compare_with_recorded(job: Job, images: Sequence[Image], options: ReplayOpt
     elif ended and not difference.differences:
         complain(f"the replay ended after {len(again.periods)} of {len(recorded)} recorded control periods")
     elif recorded and not difference.differences and not compare.as_json:
-        show(f"the robots' response equals the recorded one in {extent(rule, again.periods)}")
+        whose = (
+            "the board does the same as recorded"
+            if job.alone
+            else "the robots' response equals the recorded one"
+        )
+        show(f"{whose} in {extent(rule, again.periods)}")
     differs = (difference.differences or ended) and not options.expects
     code = exit_code(result.verdict, *(["differs"] if differs else []))
     if compare.as_json:
@@ -214,7 +223,8 @@ def _rerun(job: Job, to_tick: int | None, quiet: bool) -> Run:
     """
     end_tick = job.end_tick
     if to_tick is not None and job.recorded:
-        end_tick = min(end_tick, -(-to_tick // CONTROL_PERIOD_TICKS) * CONTROL_PERIOD_TICKS)
+        period_ticks = job.spec.scenario.period_ticks
+        end_tick = min(end_tick, -(-to_tick // period_ticks) * period_ticks)
     elif to_tick is not None:
         end_tick = min(to_tick, job.case.end_tick or to_tick)
     with ProgressBar("replaying", end_tick, quiet) as bar:

@@ -24,13 +24,16 @@ import msgspec
 
 from miro_exact.bad_input import BadInput
 from miro_exact.clock import CHARACTER_BITS
-from miro_protocol.actions import ScriptItem
+from miro_protocol.actions import Put, ScriptItem
 from miro_protocol.stream import StreamFile
-from miro_protocol.toml_text import TomlError, struct_of
+from miro_protocol.stream_header import Header
+from miro_protocol.toml_text import TomlError, struct_of, tables
 from miro_protocol.transmission import Transmission
 from miro_robot.board_spec import CRYSTAL_HZ, BoardSpec
 from miro_robot.image import Image
+from miro_robot.parts.values import checked_put
 from miro_sim.scenario.board import BoardScenario
+from miro_sim.scenario.board_scenario import BOARD, board_of_tables
 from mirotwin.runs.spec import RunSpec
 
 AHEAD_TICKS = 240
@@ -73,18 +76,75 @@ def after_ticks(scenario: BoardScenario) -> int:
     return scenario.clock * AFTER_MS // 1000
 
 
+def is_for_board(header: Header) -> bool:
+    """Whether a stream is for a board, and not for robots."""
+    return not (header.bare is None and header.board is None) or (
+        isinstance(header.scenario, dict) and BOARD in header.scenario
+    )
+
+
+def is_of_board(scenario_text: str) -> bool:
+    """Whether the scenario of a recording is one of a board; a text that cannot be read is not."""
+    try:
+        return BOARD in tables(scenario_text)
+    except TomlError:
+        return False
+
+
+def tables_of_stream(given: StreamFile, script: Sequence[ScriptItem]) -> dict[str, Any]:
+    """The tables of the scenario of a stream for a board; it lasts as long as the stream, if the header says no more.
+
+    Raises BadInput.
+    """
+    header = given.header
+    if isinstance(header.scenario, dict):
+        if header.board is not None:
+            raise BadInput("", "header: board", "the scenario has a board, too", "leave one out")
+        return header.scenario
+    if header.scenario is not None:
+        reason = f"{header.scenario!r} is a scenario of robots, and the stream is for a board"
+        raise BadInput("", "header: scenario", reason, "leave it out, or give a whole scenario")
+    table = {BOARD: header.board, "duration_s": 1.0}
+    scenario = board_of_tables(table, "", beside=given.source).scenario
+    return table | {"duration_s": (header.end_tick or end_of_board(script, scenario)) / scenario.clock}
+
+
+def check_crystal(scenario: BoardScenario, crystal_hz: int, path: str) -> None:
+    """Raises BadInput for a board with another crystal than the one whose ticks the file counts."""
+    if scenario.clock != crystal_hz:
+        reason = (
+            f"its ticks are of a crystal of {crystal_hz} Hz, and the board has one of {scenario.clock} Hz"
+        )
+        raise BadInput(path, "crystal_hz", reason, f"give crystal_hz = {scenario.clock} if they are of that")
+
+
 def check_board_script(script: Sequence[ScriptItem], path: str, scenario: BoardScenario) -> None:
     """Raises BadInput for characters that overlap, and for what is done to other devices."""
     free_tick = 0
     for item in script:
         if item.network or getattr(item, "slot", 0):
             raise BadInput(path, f"tick {item.tick}", "is not for the board, which is alone on network 0")
+        if isinstance(item, Put):
+            _check_put(item, path, scenario)
         if not isinstance(item, Transmission):
             continue
+        if not scenario.host_bit_ticks:
+            reason = "says no bit_ticks, and the board no baud"
+            raise BadInput(
+                path, "header", reason, "give the length of a bit in the scenario, or [serial] baud"
+            )
         if item.tick < free_tick:
             reason = f"the characters at tick {item.tick} begin before those before them end"
             raise BadInput(path, "", reason, f"leave {free_tick - item.tick} ticks between them")
         free_tick = item.tick + _duration(item, scenario)
+
+
+def _check_put(put: Put, path: str, scenario: BoardScenario) -> None:
+    try:
+        checked_put(scenario.parts, put.path, put.value)
+    except ValueError as error:
+        reason, _, remedy = f"{error}".partition("; ")
+        raise BadInput(path, f"tick {put.tick}", reason, remedy) from None
 
 
 def board_spec(
@@ -107,4 +167,4 @@ def board_spec(
 
 
 def _duration(item: ScriptItem, scenario: BoardScenario) -> int:
-    return CHARACTER_BITS * scenario.bit_ticks * len(item.data) if isinstance(item, Transmission) else 0
+    return CHARACTER_BITS * scenario.host_bit_ticks * len(item.data) if isinstance(item, Transmission) else 0

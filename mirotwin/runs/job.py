@@ -16,15 +16,16 @@ from miro_exact.clock import CONTROL_PERIOD_TICKS, TICKS_PER_SECOND, seconds
 from miro_exact.inputs import RECORDING_BYTES, check_no_folder, read_input
 from miro_exact.installed import differences as plugin_differences
 from miro_protocol import stream
-from miro_protocol.actions import Power, Reset, ScriptItem
+from miro_protocol.actions import Power, Put, Reset, ScriptItem
 from miro_protocol.stream_header import Header
 from miro_protocol.transmission import DOWN, Transmission
-from miro_robot.image import SPACE_BYTES, Image, Symbol, Symbols, parse_hex
+from miro_robot.image import FLASH_BYTES, SPACE_BYTES, Image, Symbol, Symbols, parse_hex
 from miro_sim.periods import Period
 from miro_sim.radio.params import Radio
 from miro_sim.scenario.board import BoardScenario
+from miro_sim.scenario.board_scenario import any_of_text, board_of_tables
 from miro_sim.scenario.errors import ScenarioError
-from miro_sim.scenario.file import builtin_names, changed, load, of_table, of_text
+from miro_sim.scenario.file import builtin_names, changed, load, of_table
 from miro_sim.scenario.keys import MAX_NETWORKS, NetworkSpec, Scenario
 from miro_sim.scenario.settings import EXPECT, blamed, in_text, make
 from miro_sim.world.machine import no_network
@@ -34,7 +35,16 @@ from mirotwin.recording.capture.layout import frame_counts
 from mirotwin.recording.reader import Recording, parse
 from mirotwin.recording.recorder import SCENARIO_ATTACHMENT, RunSource
 from mirotwin.recording.writer import MAGIC
-from mirotwin.runs.board_case import board_of_stream, board_spec, check_board_script, end_of_board
+from mirotwin.runs.board_case import (
+    board_of_stream,
+    board_spec,
+    check_board_script,
+    check_crystal,
+    end_of_board,
+    is_for_board,
+    is_of_board,
+    tables_of_stream,
+)
 from mirotwin.runs.result import Result, expectation_lines, result_of_case
 from mirotwin.runs.run import Run, replaying
 from mirotwin.runs.spec import RunSpec
@@ -87,6 +97,10 @@ def check_script(script: Sequence[ScriptItem], scenario: Scenario | None = None)
                 )
                 raise BadInput("", f"tick {item.tick}", reason, "move it back")
             before[item.network] = item
+        elif isinstance(item, Put):
+            raise BadInput(
+                "", f"tick {item.tick}", "puts a value of a part, and robots have none", "leave it out"
+            )
         elif isinstance(item, Reset | Power) and scenario is not None:
             slots = [robot.slot for robot in scenario.networks[item.network].robot]
             if item.slot not in slots:
@@ -275,7 +289,8 @@ def load_job(
         recording = parse(data, file)
         if not recording.periods:
             raise BadInput(file, "", "the recording holds no control period", "nothing can be replayed")
-        runs_on = None if firmware is None else load_firmware(firmware, stack_from=stack_from)
+        limit = SPACE_BYTES if is_of_board(recording.source.scenario_text) else FLASH_BYTES
+        runs_on = None if firmware is None else load_firmware(firmware, limit, stack_from=stack_from)
         return _job_of_recording(recording, file, settings, runs_on, seed)
     given = _stream(data, file)
     header = given.header
@@ -291,10 +306,11 @@ def load_job(
 
 def _image_for(given: stream.StreamFile, firmware: str | Path | None, stack_from: int | None = None) -> Image:
     """The image that a stream runs on: `firmware`, or the robot's own. Raises BadInput for a board that has none."""
-    if given.header.bare is None:
+    if not is_for_board(given.header):
         return load_firmware(firmware, stack_from=stack_from)
     if firmware is None:
-        reason = "is for a bare processor, which has no firmware of its own"
+        kind = "bare processor" if given.header.bare is not None else "board"
+        reason = f"is for a {kind}, which has no firmware of its own"
         raise BadInput(given.source, "", reason, "give --firmware IMAGE.ihx")
     return load_firmware(firmware, SPACE_BYTES, stack_from=stack_from)
 
@@ -303,7 +319,7 @@ def recorded_spec(recording: Recording, path: str, image: Image | None = None) -
     """Sends again what the recorded hosts sent, on `image` (None: the recorded one). Raises BadInput."""
     source = recording.source
     with BadInput.at(f"{path}: {SCENARIO_ATTACHMENT}"):
-        scenario = of_text(source.scenario_text, "").scenario
+        scenario = _with_bits(any_of_text(source.scenario_text, "").scenario, source)
     return RunSpec(
         scenario=scenario,
         image=image or image_of(recording, path),
@@ -312,6 +328,16 @@ def recorded_spec(recording: Recording, path: str, image: Image | None = None) -
         resumed=source.resumed,
         origin=path,
     )
+
+
+def _with_bits(scenario: Scenario | BoardScenario, source: RunSource) -> Scenario | BoardScenario:
+    """The scenario of a board with the length of the bits that its host sent, which is known once it sends.
+
+    A saved world has its own, and goes on in the scenario that it was saved in.
+    """
+    if isinstance(scenario, BoardScenario) and source.bit_ticks and not source.resumed:
+        return replace(scenario, bit_ticks=source.bit_ticks)
+    return scenario
 
 
 def recording_notes(recording: Recording, path: str) -> list[str]:
@@ -365,12 +391,17 @@ def _job_of_recording(
             raise
     as_recorded = recorded_spec(recording, path, image or runs_on)
     with BadInput.at(f"{path}: {SCENARIO_ATTACHMENT}"):
-        text = of_text(source.scenario_text, "", settings)
-        scenario, expected = text.scenario, expectations_in(text)
-    with BadInput.at(path):
-        check_script(as_recorded.script or (), scenario)
+        text = any_of_text(source.scenario_text, "", settings)
+        scenario, expected = _with_bits(text.scenario, source), expectations_in(text)
+    if isinstance(scenario, BoardScenario):
+        check_crystal(scenario, source.crystal_hz, path)
+        check_board_script(as_recorded.script or (), path, scenario)
+        silent = True
+    else:
+        with BadInput.at(path):
+            check_script(as_recorded.script or (), scenario)
+        silent = all(network.host == "silent" for network in scenario.networks)
     as_it_was = image is not None and not settings and seed in (None, source.seed)
-    silent = all(network.host == "silent" for network in scenario.networks)
     spec = replace(
         as_recorded,
         scenario=scenario,
@@ -393,6 +424,8 @@ def _job_of_stream(
     given: stream.StreamFile, path: str, settings: Sequence[str], image: Image, seed: int | None
 ) -> Job:
     if given.header.bare is not None:
+        return _job_of_bare(given, path, settings, image, seed)
+    if is_for_board(given.header):
         return _job_of_board(given, path, settings, image, seed)
     header, sent = given.header, given.script()
     keys = [*in_text(header.set or {}), *in_text({"expect": header.expect or {}})]
@@ -420,6 +453,32 @@ def _job_of_stream(
 
 
 def _job_of_board(
+    given: stream.StreamFile, path: str, settings: Sequence[str], image: Image, seed: int | None
+) -> Job:
+    """Of a board that the header names, or holds in its scenario."""
+    header, script, own = given.header, script_of_stream(given.script()), given.header.seed or 0
+    keys = [*in_text(header.set or {}), *in_text({"expect": header.expect or {}})]
+    with BadInput.at(path):
+        tables = tables_of_stream(given, script)
+        text, as_written = (board_of_tables(tables, "", more, path) for more in ((*keys, *settings), keys))
+        expected = expectations_in(text)
+    scenario = text.scenario
+    check_crystal(scenario, header.crystal_hz or TICKS_PER_SECOND, path)
+    check_board_script(script, path, scenario)
+    other = header.firmware_sha256 not in (None, image.sha256) or seed not in (None, own)
+    other = other or scenario != as_written.scenario
+    spec = RunSpec(
+        scenario=scenario,
+        image=image,
+        seed=own if seed is None else seed,
+        script=script,
+        expected=expected,
+        origin=path,
+    )
+    return Job(spec=spec, case=Case(header.verdict or "", header.end_tick or 0, other))
+
+
+def _job_of_bare(
     given: stream.StreamFile, path: str, settings: Sequence[str], image: Image, seed: int | None
 ) -> Job:
     header, script = given.header, script_of_stream(given.script())

@@ -15,6 +15,7 @@ from miro_exact import engine as engines
 from miro_exact.bad_input import BadInput, amount, shortened
 from miro_exact.domain import MAX_SEED, DomainError
 from miro_exact.plugins import PluginError
+from miro_sim.scenario.board import BoardScenario
 from miro_sim.scenario.file import builtin_names
 from miro_sim.scenario.keys import Scenario
 from mirotwin.shell.command import Argument, Option, Word
@@ -150,7 +151,7 @@ Engine = Annotated[
 ]
 
 
-def refuse_steps(scenario: Scenario, origin: str) -> None:
+def refuse_steps(scenario: Scenario | BoardScenario, origin: str) -> None:
     """For commands that run a scenario without its steps: raises BadInput if it has any."""
     if scenario.step:
         reason = f"has {amount(len(scenario.step), 'step')}, which only `mirotwin run` and `mirotwin test` do"

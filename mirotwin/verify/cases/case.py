@@ -24,15 +24,18 @@ from typing import Any
 
 import msgspec
 import tomli_w
+from msgspec.structs import replace
 
 from miro_exact.bad_input import encodable, one_line
 from miro_exact.inputs import replace_file
 from miro_protocol import stream, stream_header
 from miro_protocol.actions import ScriptItem
 from miro_protocol.transmission import DOWN
+from miro_robot.board_spec import BoardSpec
 from miro_robot.image import Image
 from miro_sim.periods import Period
 from miro_sim.scenario.board import BoardScenario
+from miro_sim.scenario.board_scenario import tables_of_board
 from miro_sim.scenario.keys import Scenario, without_expectations
 from miro_sim.world.world import World
 from mirotwin.verify.checks.interface import Failure
@@ -66,6 +69,7 @@ class Trace:
 
 
 SUFFIX = ".stream"
+_WITH_HEADER = (b"# mirotwin stream 2", b"# mirotwin stream 3")
 
 
 def case_text(
@@ -77,6 +81,13 @@ def case_text(
     """
     scenario = world.scenario
     end_tick = world.tick if end_tick is None else end_tick
+    if isinstance(scenario, BoardScenario) and not _is_bare(scenario):
+        said = {"end_tick": end_tick, **({"expect": dict(expect)} if expect else {})}
+        board = replace(scenario, bit_ticks=world.bit_ticks)
+        if board.duration_ticks is None:
+            board = replace(board, duration_ticks=end_tick)
+        said |= {"crystal_hz": scenario.clock, "scenario": tables_of_board(board)}
+        return stream_text(trace.script(), world.image, {"seed": world.seed}, verdict, said)
     if isinstance(scenario, BoardScenario):
         expected = {"expect": dict(expect)} if expect else {}
         bare = {
@@ -88,6 +99,19 @@ def case_text(
         return stream_text(trace.script(), world.image, {}, verdict, more)
     more = {"end_tick": end_tick, "expect": dict(expect), "scenario": tables_of(scenario)}
     return stream_text(trace.script(), world.image, {"seed": world.seed}, verdict, more)
+
+
+def _is_bare(scenario: BoardScenario) -> bool:
+    """Whether it is the processor with external RAM, and nothing on it."""
+    board = scenario.board
+    bare = BoardSpec(
+        name=board.name,
+        crystal_hz=board.crystal_hz,
+        code_in_xram=board.code_in_xram,
+        start=board.start,
+        bound_stack=board.bound_stack,
+    )
+    return board == bare
 
 
 def stream_text(
@@ -169,4 +193,4 @@ def has_header(path: str | Path) -> bool:
     if not Path(path).is_file():
         return False
     with open(path, "rb") as file:
-        return file.read(32).lstrip(b"\xef\xbb\xbf").startswith(b"# mirotwin stream 2")
+        return file.read(32).lstrip(b"\xef\xbb\xbf").startswith(_WITH_HEADER)

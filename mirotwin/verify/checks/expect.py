@@ -87,8 +87,10 @@ def named_in(scenario: Scenario | BoardScenario) -> set[str]:
     return {name for table in tables if isinstance(table, dict) for name in table}
 
 
-def says_anything(scenario: Scenario) -> bool:
+def says_anything(scenario: Scenario | BoardScenario) -> bool:
     """Whether a scenario expects more than what every run has to fulfil."""
+    if isinstance(scenario, BoardScenario):
+        return bool(scenario.expect)
     return bool(scenario.expect or any(robot.expect for one in scenario.networks for robot in one.robot))
 
 

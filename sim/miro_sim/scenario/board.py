@@ -25,11 +25,11 @@ FASTEST_BIT_TICKS = 32
 class BoardScenario(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_only=True):
     """`board` on a wire. A tick is a period of its crystal.
 
-    The wire's host is the `terminal`, or who injects, or a script. `bit_ticks`: length of the host's bits, 0 for those
-    of the board's receiver. `duration_ticks`: default, without end. `stop_at`: the run stops before an instruction at
-    one of these addresses; `stop_at_end`: when the program has ended; `stop_on_fault`: at the first firmware fault.
-    `begin_tick`: the firmware has started up, and is judged from then on. `put`: values of parts at power-on, by
-    PART.KEY. `step`: what is done during the run, as of a scenario of robots.
+    The wire's host is the `terminal`, or who injects, or a script. `bit_ticks`: length of the host's bits, 0 for the
+    board's baud, or else those of its receiver. `duration_ticks`: default, without end. `stop_at`: the run stops before
+    an instruction at one of these addresses; `stop_at_end`: when the program has ended; `stop_on_fault`: at the first
+    firmware fault. `begin_tick`: the firmware has started up, and is judged from then on. `put`: values of parts at
+    power-on, by PART.KEY. `step`: what is done during the run, as of a scenario of robots.
     Raises ValueError for values out of range, and for a value that no part takes.
     """
 
@@ -58,6 +58,12 @@ class BoardScenario(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_
             raise ValueError(f"begin_tick {self.begin_tick} is outside 0..{LATEST_BEGIN_TICK}")
         for path, value in self.put.items():
             checked_put(self.parts, path, value)
+
+    @property
+    def host_bit_ticks(self) -> int:
+        """Length of the host's bits: as given, or at the board's baud; 0 for those of the receiver."""
+        board = self.board
+        return self.bit_ticks or ((board.crystal_hz + board.baud // 2) // board.baud if board.baud else 0)
 
     @property
     def parts(self) -> dict[str, PartKeys]:

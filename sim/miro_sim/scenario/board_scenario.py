@@ -95,11 +95,25 @@ def any_of_text(text: str, origin: str, settings: Sequence[str] = ()) -> AnyText
     return _checked(whole, origin, settings, own)
 
 
-def any_of_table(raw: Table, origin: str) -> AnyText:
-    """As `load_any`, of the tables that a text without a file gave."""
-    if BOARD in raw:
-        return _checked(_complete(raw, ""), origin)
-    return ScenarioText(origin, tables=raw, scenario=robots_file.of_table(raw, origin))
+def board_of_tables(raw: Table, origin: str, settings: Sequence[str] = (), beside: str = "") -> BoardText:
+    """As `load_any`, of tables that stand in another file. `beside`: the path of that one, "" if they may name none."""
+    return _checked(_complete(raw, beside), origin, settings)
+
+
+def tables_of_board(scenario: BoardScenario) -> Table:
+    """The tables of a file with this scenario, without what is expected of it. It has a duration."""
+    assert scenario.duration_ticks is not None
+    every = {
+        "name": scenario.name,
+        "title": scenario.title,
+        "duration_s": scenario.duration_ticks / scenario.clock,
+        "stop_on_fault": scenario.stop_on_fault,
+        "bit_ticks": scenario.bit_ticks,
+        "begin_tick": scenario.begin_tick,
+        "put": dict(scenario.put),
+        BOARD: table_of(scenario.board),
+    }
+    return {key: value for key, value in every.items() if value not in ("", 0, {}) or value is False}
 
 
 def _read(source: str) -> Table:

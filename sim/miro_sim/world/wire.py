@@ -8,7 +8,6 @@ from miro_exact.clock import CHARACTER_BITS, CYCLE_TICKS
 from miro_exact.state import TICK
 from miro_protocol.actions import PutValue, ScriptItem
 from miro_protocol.transmission import UP, Transmission, check_bad_stop, of_symbols
-from miro_robot.board_spec import BoardSpec
 from miro_robot.build import board_of
 from miro_robot.empty_board import EmptyBoard
 from miro_robot.image import Image
@@ -25,11 +24,6 @@ from miro_sim.world.outbox import Outbox
 from miro_sim.world.terminal import Terminal, moves
 
 _STOP = CHARACTER_BITS - 1
-
-
-def _bit_ticks(board: BoardSpec) -> int:
-    """Length of a bit at the board's baud, rounded; 0 for the receiver's own."""
-    return (board.crystal_hz + board.baud // 2) // board.baud if board.baud else 0
 
 
 class BoardAlone(Device):
@@ -98,7 +92,7 @@ class Wire(Medium):
         sending = sent_to(index, script)
         self.terminal = None if scenario.terminal is None else Terminal(scenario.terminal, board)
         host = "script" if sending is not None else "silent" if self.terminal is None else "terminal"
-        self.bit_ticks = scenario.bit_ticks or _bit_ticks(scenario.board)  # 0: not known yet
+        self.bit_ticks = scenario.host_bit_ticks  # 0: not known yet
         self.busy_tick = 0
         self.transmissions = 0
         self.character_ticks = 0  # of the last one that the board sent
