@@ -150,6 +150,7 @@ def _source(messages: Messages) -> RunSource:
         resumed=attachments.get(RESUMED_ATTACHMENT, b""),
         origin=metadata.get("source", ""),
         plugins=tuple(metadata.get("plugins", "").splitlines()),
+        board=metadata.get("board", ""),
         crystal_hz=_number(messages, metadata, "crystal_hz", TICKS_PER_SECOND),
         bit_ticks=_number(messages, messages.serial, "bit_ticks", 0),
     )

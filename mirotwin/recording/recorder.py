@@ -18,7 +18,7 @@ from miro_exact.bad_input import BadInput
 from miro_exact.clock import TICKS_PER_SECOND
 from miro_exact.installed import described_once
 from miro_sim.periods import Period
-from miro_sim.scenario.board_scenario import AnyText
+from miro_sim.scenario.board_scenario import AnyText, BoardText
 from miro_sim.scenario.plugins import plugins_used
 from mirotwin.recording import channels
 from mirotwin.recording.channels import FaultMessage, ImageMessage, TheoryMessage
@@ -53,8 +53,9 @@ class RunSource(msgspec.Struct, frozen=True):
     space). `state`: the form of the states that its digests are of (`Flat.tables`), "" where it is not known.
     `resumed`: the saved world that the run went on from, empty for a run from its start. `origin`: "port" where robots
     were real and what is in it is their twin's, else empty. `plugins`: those of other distributions that the scenario
-    names, with version and hash of their sources (`miro_exact.installed.described`). `crystal_hz`: ticks per second.
-    `bit_ticks`: length of the bits that the host of a board sent, 0 where it sent none.
+    names, with version and hash of their sources (`miro_exact.installed.described`). `board`: its name, ""
+    for robots. `crystal_hz`: ticks per second. `bit_ticks`: length of the bits that the host of a board sent, 0 where
+    it sent none.
     """
 
     scenario_name: str
@@ -68,6 +69,7 @@ class RunSource(msgspec.Struct, frozen=True):
     resumed: bytes = b""
     origin: str = ""
     plugins: tuple[str, ...] = ()
+    board: str = ""
     crystal_hz: int = TICKS_PER_SECOND
     bit_ticks: int = 0
 
@@ -86,6 +88,7 @@ def source_of(text: AnyText, world: World, record: str = "default", resumed: byt
         state=world.state.tables(),
         resumed=resumed,
         plugins=plugins_used(text.scenario, described_once),
+        board=text.scenario.board.name if isinstance(text, BoardText) else "",
         crystal_hz=world.clock,
     )
 
@@ -118,6 +121,7 @@ class Recorder:
                 **({"state": source.state} if source.state else {}),
                 **({"source": source.origin} if source.origin else {}),
                 **({"plugins": "\n".join(source.plugins)} if source.plugins else {}),
+                **({"board": source.board} if source.board else {}),
                 **({"crystal_hz": f"{source.crystal_hz}"} if source.crystal_hz != TICKS_PER_SECOND else {}),
             },
         )

@@ -141,7 +141,7 @@ def extent(rule: CompareRule, periods: Sequence[Period]) -> str:
     """How much of these was compared, and how: `all 6 control periods (commands, within 0.5 ms)`."""
     whole = f"all {amount(rule.compared(periods), 'control period')}"
     if rule.kind in _APPLIES["within_ms"]:
-        return f"{whole} ({rule.kind}, within {1000 * rule.within_ticks / rule.clock:g} ms)"
+        return f"{whole} ({rule.kind}, within {1000 * rule.within_ticks / rule.clock:.4g} ms)"
     if rule.kind == "wheels":
         per_sample = f"{rule.within_counts_per_sample:g} counts per sample"
         return f"{whole} (wheels, within {rule.within_counts} counts and {per_sample})"

@@ -24,10 +24,10 @@ import msgspec
 
 from miro_exact.bad_input import BadInput
 from miro_exact.clock import CHARACTER_BITS
-from miro_protocol.actions import Put, ScriptItem
+from miro_protocol.actions import Put, RadioState, ScriptItem
 from miro_protocol.stream import StreamFile
 from miro_protocol.stream_header import Header
-from miro_protocol.toml_text import TomlError, struct_of, tables
+from miro_protocol.toml_text import TomlError, struct_of
 from miro_protocol.transmission import Transmission
 from miro_robot.board_spec import CRYSTAL_HZ, BoardSpec
 from miro_robot.image import Image
@@ -83,14 +83,6 @@ def is_for_board(header: Header) -> bool:
     )
 
 
-def is_of_board(scenario_text: str) -> bool:
-    """Whether the scenario of a recording is one of a board; a text that cannot be read is not."""
-    try:
-        return BOARD in tables(scenario_text)
-    except TomlError:
-        return False
-
-
 def tables_of_stream(given: StreamFile, script: Sequence[ScriptItem]) -> dict[str, Any]:
     """The tables of the scenario of a stream for a board; it lasts as long as the stream, if the header says no more.
 
@@ -124,6 +116,10 @@ def check_board_script(script: Sequence[ScriptItem], path: str, scenario: BoardS
     for item in script:
         if item.network or getattr(item, "slot", 0):
             raise BadInput(path, f"tick {item.tick}", "is not for the board, which is alone on network 0")
+        if isinstance(item, RadioState):
+            raise BadInput(
+                path, f"tick {item.tick}", "a board is on a wire, which has no radio", "leave it out"
+            )
         if isinstance(item, Put):
             _check_put(item, path, scenario)
         if not isinstance(item, Transmission):

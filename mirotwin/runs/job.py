@@ -42,7 +42,6 @@ from mirotwin.runs.board_case import (
     check_crystal,
     end_of_board,
     is_for_board,
-    is_of_board,
     tables_of_stream,
 )
 from mirotwin.runs.result import Result, expectation_lines, result_of_case
@@ -289,7 +288,7 @@ def load_job(
         recording = parse(data, file)
         if not recording.periods:
             raise BadInput(file, "", "the recording holds no control period", "nothing can be replayed")
-        limit = SPACE_BYTES if is_of_board(recording.source.scenario_text) else FLASH_BYTES
+        limit = SPACE_BYTES if recording.source.board else FLASH_BYTES
         runs_on = None if firmware is None else load_firmware(firmware, limit, stack_from=stack_from)
         return _job_of_recording(recording, file, settings, runs_on, seed)
     given = _stream(data, file)

@@ -7,8 +7,12 @@ period is put together again here.
 from __future__ import annotations
 
 import heapq
+import re
 from collections.abc import Callable, Iterable, Iterator, Sequence
 
+import msgspec
+
+from miro_exact.clock import TICKS_PER_SECOND
 from miro_protocol.transmission import UP, Transmission, joined
 from miro_sim.periods import Period
 from miro_sim.scenario.errors import ScenarioError
@@ -31,12 +35,18 @@ def transmissions(
     messages = Messages(source.read, source.label, (channels.WireMessage, channels.PeriodMessage))
     order = _Order()
     failure: RecordingError | None = None
+    crystal_hz = 0
     try:
-        yield from _ordered(messages, order, robots)
+        for sent in _ordered(messages, order, robots):
+            if not crystal_hz:
+                crystal_hz = _crystal_hz(messages, tell)
+            yield in_usual_ticks(sent, crystal_hz)
     except RecordingError as error:
         failure = error
     _take_layouts(messages, robots)
-    yield from order.rest()
+    crystal_hz = crystal_hz or _crystal_hz(messages, tell)
+    for sent in order.rest():
+        yield in_usual_ticks(sent, crystal_hz)
     if failure is not None and (not isinstance(failure, BrokenOff) or messages.metadata is None):
         raise failure
     messages.check_ours()
@@ -49,6 +59,30 @@ def transmissions_of(periods: Iterable[Period]) -> list[Transmission]:
     order = _Order()
     closed = [sent for period in periods for sent in order.close(period.tick, period.wire)]
     return [*closed, *order.rest()]
+
+
+def in_usual_ticks(sent: Transmission, crystal_hz: int) -> Transmission:
+    """The transmission at ticks of 24 MHz, of one at ticks of another crystal."""
+    if crystal_hz == TICKS_PER_SECOND:
+        return sent
+    return msgspec.structs.replace(sent, tick=sent.tick * TICKS_PER_SECOND // crystal_hz)
+
+
+def units_line(label: str, crystal_hz: int) -> str:
+    """The line about a file that counts ticks of another crystal."""
+    return f"{label}: ticks of its {crystal_hz} Hz crystal are given in those of {TICKS_PER_SECOND} Hz"
+
+
+def _crystal_hz(messages: Messages, tell: Callable[[str], None]) -> int:
+    """Ticks per second of a recording; tells what is otherwise about one of a board."""
+    metadata = messages.metadata or {}
+    if "board" in metadata:
+        tell(f"{messages.path}: is of a board, whose bytes are no frames of robots; what was put is left out")
+    text = metadata.get("crystal_hz", "")
+    if not re.fullmatch(r"[1-9][0-9]{0,9}", text):
+        return TICKS_PER_SECOND
+    tell(units_line(messages.path, int(text)))
+    return int(text)
 
 
 def _ordered(messages: Messages, order: _Order, robots: dict[int, int]) -> Iterator[Transmission]:

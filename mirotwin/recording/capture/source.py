@@ -94,14 +94,13 @@ def _stream(given: Input, tell: Callable[[str], None]) -> Iterator[Transmission]
         if not crystal_hz:
             crystal_hz = _crystal_hz(reader.header)
             if crystal_hz != TICKS_PER_SECOND:
-                units = f"ticks of its {crystal_hz} Hz crystal are given in those of {TICKS_PER_SECOND} Hz"
-                tell(f"{given.label}: {units}")
-        yield msgspec.structs.replace(sent, tick=sent.tick * TICKS_PER_SECOND // crystal_hz)
+                tell(recorded.units_line(given.label, crystal_hz))
+        yield recorded.in_usual_ticks(sent, crystal_hz)
 
 
 def _crystal_hz(header: Header) -> int:
-    """The clock of the file's ticks; of a case for a bare processor its own crystal, if it names one."""
-    named = (header.bare or {}).get("crystal_hz")
+    """The clock of the file's ticks: the crystal that it names, or that a case for a bare processor names."""
+    named = header.crystal_hz or (header.bare or {}).get("crystal_hz")
     return named if type(named) is int and named > 0 else TICKS_PER_SECOND
 
 
