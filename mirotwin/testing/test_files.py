@@ -13,9 +13,11 @@ from functools import partial
 from msgspec.structs import replace
 
 from miro_exact.bad_input import BadInput
+from miro_robot.image import SPACE_BYTES
 from mirotwin.runs.job import load_stream
 from mirotwin.runs.result import Line, Result
 from mirotwin.runs.test_file import cannot_be_run, run_test
+from mirotwin.shell.firmware_image import load_firmware
 from mirotwin.testing.test_options import TestOptions
 from mirotwin.verify.cases.case import SUFFIX as CASE_SUFFIX
 from mirotwin.verify.cases.replay_line import replay_line
@@ -30,6 +32,8 @@ def run_file(options: TestOptions, file: str) -> Result:
 def _run_scenario(options: TestOptions, file: str) -> Result:
     """Runs a scenario file as a test: in the twin, or at a port."""
     again = partial(options.line_for, file)
+    if options.firmware is not None:  # an image that no file can run on ends the command
+        load_firmware(options.firmware, SPACE_BYTES)
     settings = (*options.settings, *as_settings(options.expected))
     result = run_test(file, options.firmware, options.seed, settings, options.artifacts, again, options.desk)
     return replace(result, again=result.again or again())
