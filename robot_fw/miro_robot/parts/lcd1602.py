@@ -189,7 +189,7 @@ class Lcd1602Part(Part):
             self.data_tick = tick
 
     def due(self, tick: int) -> None:
-        """The busy flag falls while it is being read."""
+        """The busy flag falls, or the address moves on, while they are read."""
         self._answer(tick)
 
     def _answer(self, tick: int) -> None:
@@ -202,7 +202,10 @@ class Lcd1602Part(Part):
             return
         value = self.data
         if not self.levels & _RS:
-            value = self.old_address if tick < self.count_tick else self.address
+            value = self.address
+            if tick < self.count_tick:
+                value = self.old_address
+                self.next_tick = self.count_tick
             if tick < self.busy_tick:
                 value |= 0x80
                 self.next_tick = self.busy_tick

@@ -51,7 +51,7 @@ def test_a_read_goes_on_from_the_end_of_the_memory_to_its_beginning():
 
 
 def test_in_a_write_cycle_no_address_is_acknowledged():
-    bus = eeprom(half=59)
+    bus = eeprom()
     bus.write(0xA0, 0, 1)
     begin, polls = bus.edges_of("sda")[-1][0], 0
     while True:

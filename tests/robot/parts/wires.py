@@ -1,7 +1,5 @@
-"""Masters that tests move by hand: a port that puts several pins on one tick, a display's bus, an I2C bus."""
+"""Masters that tests move by hand: a display's bus, an I2C bus."""
 
-from miro_robot.parts.keys import HIGH, LOW, RELEASED, STRONG, PartKeys, Pin
-from miro_robot.parts.part import Part
 from tests.robot.parts.bench import Bench
 
 HZ = 12_000_000
@@ -10,39 +8,15 @@ MS = 12_000
 DATA = [f"d{bit}" for bit in range(8)]
 
 
-class Port(PartKeys, frozen=True, kw_only=True, tag="port"):
-    """Drives many nets at once."""
-
-    PINS = tuple(Pin(f"p{number}", STRONG) for number in range(12))
-
-    def make(self, place):
-        return PortPart(self, place)
-
-
-class PortPart(Part):
-    def put(self, name, value, tick):
-        for pin, level in value.items():
-            self.drive(pin, level)
-
-
 class Wires(Bench):
-    """One part named `chip`, and a port with a pin at each of `nets`."""
+    """One part named `chip`, and a master that drives `nets`."""
 
     def __init__(self, keys, pins, nets, **named):
-        self.nets_of_port = {net: number for number, net in enumerate(nets)}
-        parts = {
-            "chip": (keys, pins),
-            "port": (Port(), {f"p{n}": net for net, n in self.nets_of_port.items()}),
-        }
-        super().__init__(parts, crystal_hz=HZ, **named)
+        super().__init__({"chip": (keys, pins)}, nets, **{"crystal_hz": HZ, **named})
 
-    def set(self, tick=None, **levels):
-        """Puts levels of nets on one tick; None lets go."""
-        driven = {
-            self.nets_of_port[net]: RELEASED if level is None else HIGH if level else LOW
-            for net, level in levels.items()
-        }
-        self.put("port.levels", driven, tick)
+    def set(self, **levels):
+        """Drives nets from now on, all at once; None lets go."""
+        self.drive_all(levels)
 
     def later(self, ticks):
         """Lets time pass."""
