@@ -9,6 +9,7 @@ from miro_exact.bad_input import shortened
 from miro_exact.plugins import PluginError
 from miro_sim.scenario import file as scenario_file
 from miro_sim.scenario import profiles as scenario_profiles
+from miro_sim.scenario.board_scenario import load_any
 from mirotwin.shell.command import Argument, Options, command_of
 from mirotwin.shell.console import plain_table
 from mirotwin.shell.console import show as print_result
@@ -74,7 +75,7 @@ def show(options: ScenarioOptions) -> None:
         set = { network.robot.controller.q1_per_s = 0.3 }
     """
     name, settings = options.name, options.settings
-    text = scenario_file.load(name, settings).text if settings else scenario_file.source_text(name)
+    text = load_any(name, settings).text if settings else scenario_file.source_text(name)
     click.echo(text, nl=False)
 
 

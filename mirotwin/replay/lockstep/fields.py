@@ -69,6 +69,7 @@ def extents(image: Image) -> dict[str, tuple[int, int]]:
 
 _RAM = ".cpu.iram"
 _STEP = re.compile(r"(\w+)(?:\[(\w+)\])?")
+_PART = re.compile(r"lines\[(\d+)\]\.devices\[(\d+)\]\.board\.parts\[(\d+)\]")
 _CHAIN = "chain"
 """The digest before: it differs because something else did."""
 
@@ -100,7 +101,8 @@ def _as_json(value: Any) -> Any:
 
 
 class FieldDifference(Record, frozen=True):
-    """A field of the state: `path` by the tables, `symbol` where the firmware has a name for it, and both values.
+    """A field of the state: `path` by the tables, `symbol` where the firmware has a name for it, and both values. Of a
+    part on a board `symbol` is the part's name.
 
     A value is a number, or the text of something longer; None: there is no such item.
     """
@@ -128,7 +130,17 @@ def differing(world: World, other: World) -> Iterator[FieldDifference]:
                 symbol = name_of_byte(world.image, index) or None
                 yield FieldDifference(f"{path}[{index:02X}h]", symbol, here, there)
             else:
-                yield FieldDifference(path + item, None, here, there)
+                yield FieldDifference(path + item, _name_of_part(world, path), here, there)
+
+
+def _name_of_part(world: World, path: str) -> str | None:
+    """The name of the part that a field belongs to; None where it belongs to none."""
+    found = _PART.match(path)
+    if found is None:
+        return None
+    line, device, part = map(int, found.groups())
+    name: str = world.lines[line].devices[device].board.parts[part].name
+    return name
 
 
 def _is_apart(root: Any, path: str) -> bool:

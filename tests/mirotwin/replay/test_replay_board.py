@@ -69,6 +69,7 @@ def test_another_image_or_setting_differs_with_the_value_of_a_part_first(mirotwi
     assert "their states differ from tick" in line
     line = mirotwin.ends(4, "replay", recorded, "--set", "put.key.pressed=false", "-q")
     assert "their states differ from tick 0" in line
+    assert "board.parts[0].next_tick (key): " in line
 
 
 def test_bytes_alone_can_be_compared_and_wheels_cannot(mirotwin, recorded, scenario):
