@@ -45,6 +45,7 @@ from mirotwin.shell.options import (
     refuse_steps,
 )
 from mirotwin.shell.outputs import RECORDINGS, file_in
+from mirotwin.shell.part_files import Parts, bring_parts
 from mirotwin.shell.program import complain, tell_notes
 from mirotwin.shell.progress import ProgressBar
 from mirotwin.shell.verdicts import DONE, exit_code
@@ -73,6 +74,7 @@ class DiffOptions(Options, frozen=True, kw_only=True):
     compare: CompareOptions = CompareOptions()
     lines_from: LinesFrom = ()
     sources: SourceFolders = ()
+    parts: Parts = ()
     engine: Engine = None
     everything: Annotated[bool, ALL.saying("List every difference, not only the first of each channel.")] = (
         False
@@ -101,6 +103,7 @@ def diff(options: DiffOptions) -> int:
         remedy = "`mirotwin replay` compares a recording made at a port with its twin"
         raise BadInput("", "--compare answers", "is for robots at a port, beside their twin", remedy)
     sources = checked_sources(options.sources)
+    bring_parts(options.parts)
     first, other = _run_images(options) if _are_images(options) else _read_recordings(options)
     first, other = _with_same_robots(first, other)
     (spec, *_), (other_spec, *_) = first.ways, other.ways

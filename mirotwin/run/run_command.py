@@ -24,6 +24,7 @@ from mirotwin.shell.firmware_image import image_for
 from mirotwin.shell.held_signals import held_signals
 from mirotwin.shell.options import plain_parameters
 from mirotwin.shell.outputs import FILES, OutputFolder
+from mirotwin.shell.part_files import bring_parts
 from mirotwin.shell.program import complain, tell_notes
 from mirotwin.shell.progress import ProgressBar
 from mirotwin.verify.checks.expect import expectations_in
@@ -63,6 +64,7 @@ def run(options: RunOptions) -> int:
     not.
     """
     seed, record = options.seed, options.record
+    bring_parts(options.parts)
     text = load_any(
         options.scenario, (*options.settings, *_duration(options), *as_settings(options.expected))
     )

@@ -23,6 +23,7 @@ from mirotwin.shell.options import (
     Seed,
     StackFrom,
 )
+from mirotwin.shell.part_files import Parts
 from mirotwin.shell.times import Time, TimeType
 from mirotwin.verify.expectations import Expected
 
@@ -43,6 +44,7 @@ class RunOptions(Options, frozen=True, kw_only=True):
     expected: Expected = ()
     firmware: Firmware = None
     stack_from: StackFrom = None
+    parts: Parts = ()
     engine: Engine = None
     record: Annotated[
         Literal["default", "full"],

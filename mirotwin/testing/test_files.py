@@ -49,7 +49,7 @@ def _run_case(options: TestOptions, path: str) -> Result:
         result = _as_test(path, job.judge_case())
     except BadInput as error:
         result = cannot_be_run(path, error)
-    return replace(result, again=replay_line(path, options.firmware, tuple(expected)))
+    return replace(result, again=replay_line(path, options.firmware, tuple(expected), options.parts))
 
 
 def _as_test(path: str, result: Result) -> Result:

@@ -95,3 +95,52 @@ def test_a_fault_ends_the_run_with_its_own_code(mirotwin, tmp_path):
     line = mirotwin.ends(3, "run", path, "--out", tmp_path / "out", "-q")
     assert "firmware fault: firmware executed the undefined opcode A5 at 0x0004" in line
     assert "/fault" in str((tmp_path / "out" / "run.mcap").read_bytes())
+
+
+CLOCK = """
+from miro_exact.state import TICK
+from miro_robot.parts.keys import STRONG, PartKeys, Pin
+from miro_robot.parts.part import Part
+
+
+class Metronome(PartKeys, frozen=True, kw_only=True, tag="metronome"):
+    PINS = (Pin("pin", STRONG),)
+    READS = {"beats": "so far"}
+
+    def make(self, place):
+        return MetronomePart(self, place)
+
+
+class MetronomePart(Part):
+    STATE = {"beats": TICK}
+
+    def __init__(self, keys, place):
+        Part.__init__(self, keys, place)
+        self.beats = 0
+
+    def start(self, tick):
+        self.next_tick = tick + 1000
+
+    def due(self, tick):
+        self.beats += 1
+        if self.beats == 6000:
+            raise RuntimeError("worn out")
+        self.next_tick = tick + 1000
+"""
+
+
+def test_a_part_of_ones_own_is_run_and_its_failure_ends_the_run_in_one_line(mirotwin, tmp_path):
+    board = 'crystal_hz = 11_059_200\n[parts.beat]\npart = "metronome"\npins = { pin = "P1.0" }\n'
+    path = board_folder(tmp_path, "board = 'lamp.board.toml'\nfirmware = 'lamp.hex'\nduration_s = 1", board)
+    own = tmp_path / "metronome.py"
+    own.write_text(CLOCK)
+    words = ("run", path, "--out", tmp_path / "out", "-q")
+    assert "parts.beat.part: 'metronome' is not one of the choices" in mirotwin.refuses(*words)
+    err = mirotwin.ends(2, *words, "--part", f"{own}:Metronome")
+    assert "the run broke off after 2 control periods" in err
+    assert "part 'beat' (metronome), tick 6000000: RuntimeError: worn out (" in err
+    recording = read(tmp_path / "out" / "run.part.mcap")
+    assert recording.source.plugins[0].startswith("part metronome: metronome.py:Metronome, sources ")
+    out = mirotwin("replay", tmp_path / "out" / "run.part.mcap", "--part", f"{own}:Metronome")
+    assert (out[0], "the board does the same as recorded in all 2 control periods" in out[1]) == (0, True)
+    mirotwin.refuses("replay", tmp_path / "out" / "run.part.mcap")

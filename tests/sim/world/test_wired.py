@@ -11,6 +11,7 @@ from msgspec import Meta
 from miro_exact.clock import NEVER_TICK
 from miro_exact.state import TICK
 from miro_protocol.actions import Power, Put, Reset
+from miro_protocol.transmission import DOWN, Transmission
 from miro_robot.board_spec import BoardSpec, PartSpec
 from miro_robot.parts.button import Button
 from miro_robot.parts.keys import HIGH, IN, LOW, STRONG, PartKeys, Pin
@@ -233,6 +234,48 @@ def test_cut_saved_and_announced_at_any_tick_the_bits_are_the_same(whole, data):
         if action.tick < 1_000_000 and data.draw(st.booleans()):
             with pytest.raises(WaitExpired):
                 world.run_until(Edge(pin="P1.7"), within=data.draw(st.integers(1, 100)))
+    world.run_to(END_TICK)
+    assert (world.digest, world.state.save()) == (whole.digest, whole.state.save())
+
+
+ECHO = """
+MOV RCAP2H,#0FFh
+MOV RCAP2L,#0DCh
+MOV T2CON,#34h
+MOV SCON,#50h
+loop:
+CPL P1.1
+JNB RI,loop
+CLR RI
+MOV A,SBUF
+MOV SBUF,A
+SJMP loop
+"""
+BIT_TICKS = 1152
+BYTES = (Transmission(150_000, DOWN, b"ab"), Transmission(300_001, DOWN, b"c", bad_stop=(0,)))
+
+
+@settings(deadline=None, max_examples=15)
+@given(st.data())
+def test_bytes_among_puts_give_the_same_bits_whoever_sends_them_and_when(data):
+    keys = {"text": ECHO, "bit_ticks": BIT_TICKS}
+    items = sorted((*SCRIPT, *BYTES), key=lambda item: item.tick)
+    whole = wired_world(items, **keys)
+    whole.run_to(END_TICK)
+    world = wired_world([item for item in SCRIPT if not item.tick], **keys)
+    for item in items:
+        if not item.tick:
+            continue
+        latest = item.tick - 120
+        world.run_to(data.draw(st.integers(min(world.tick, latest), latest)))
+        if isinstance(item, Transmission):
+            world.inject(item.data, at_tick=item.tick, bad_stop=item.bad_stop)
+        else:
+            world.do(item)
+        if data.draw(st.booleans()):
+            other = wired_world([], **keys)
+            other.load(world.save())
+            world = other
     world.run_to(END_TICK)
     assert (world.digest, world.state.save()) == (whole.digest, whole.state.save())
 
