@@ -12,7 +12,7 @@ is judged when a tick is over: after its events, or after what the CPU writes on
 from __future__ import annotations
 
 from collections.abc import Sequence
-from operator import itemgetter
+from operator import attrgetter, itemgetter
 from typing import Any
 
 from miro_exact.clock import CYCLE_TICKS, NEVER_TICK
@@ -32,6 +32,7 @@ _CONTENTION = int(FaultKind.NET_CONTENTION)
 _MOVX = (0xE0, 0xE2, 0xE3, 0xF0, 0xF2, 0xF3)  # writes no register but P0, at which nothing is sampled
 _TWO_CYCLES = [int(CYCLES[opcode] == 2 and opcode not in _MOVX) for opcode in range(256)]
 _order_and_kind = itemgetter(0, 1)
+_moves = attrgetter("continuous")
 _BEHIND_TICKS = 96  # more than an instruction: so far parts may be behind the CPU
 
 
@@ -239,19 +240,19 @@ class WiredBoard(EmptyBoard):
         self._push(tick)
 
     def _supply(self, on: int, tick: int) -> None:
-        """All parts begin, or stand; then the levels that they and the ports make."""
+        """All parts begin, or stand, those that move last; then the levels that they and the ports make."""
         self.sync(tick - 1)
         nets = self.nets
         nets.powered = on
         nets.show_all()
         nets.ports_changed = 0xF
-        for index, part in enumerate(self.parts):
+        for part in sorted(self.parts, key=_moves):
             try:
                 part.supply(on, tick)
             except (Exception, SystemExit) as error:
                 place = f"part {part.name!r} ({part.keys.name}), tick {tick}: {'start' if on else 'supply'}"
                 raise PluginError(f"{place}: {raised(error)}", "repair the part") from error
-            nets.collect(index, tick)
+            nets.collect(self.part_index[part.name], tick)
         nets.settle(tick)
         self._push(tick)
 

@@ -69,15 +69,20 @@ class Lm629Part(Part):
     """`chip`: the LM629. `contention`: it is read together with another chip. `powered`: it has its supply."""
 
     STATE = {"chip": Lm629, "contention": FLAG, "powered": FLAG}
-    NOT_STATE = ("timing", "others_on_bus", "shown", "pulses_reach")
+    NOT_STATE = ("timing", "others_on_bus", "pulled", "pulses_reach")
+    SENSES_DRIVE = True  # who puts data on the bus is seen, though the chip pulls it low at the time
 
     def __init__(self, keys: Lm629Keys, place: Place) -> None:
         Part.__init__(self, keys, place)
         self.chip = Lm629(keys.options)
         self.chip.pulses = 1 if _MAG in place.connected else 0
+        for pin in (_HI, _MAG, _SIGN):
+            self.drives[pin] = self.wanted[pin] = (
+                LOW  # as the chip has them: a motor must not start before it does
+            )
         self.timing = BusTiming()
         self.others_on_bus: list[Lm629Part] = []
-        self.shown = 0xFF  # what is driven onto d0 to d7; a 1 is let go
+        self.pulled = 0  # of d0 to d7, those that the chip pulls low
         self.pulses_reach = 0  # edges of `mag` and `sign` may come to the host
         self.contention = 0
         self.powered = 1
@@ -96,11 +101,16 @@ class Lm629Part(Part):
         return [part for part, _ in self.place.peers.get(pin, []) if not part.continuous]
 
     def supply(self, on: int, tick: int) -> None:
-        """Without supply it is in reset; what the host does to it then is no fault."""
+        """Without supply it is in reset, and its host is, too: the bus is at rest."""
         self.powered = on
         self.chip.set_reset(tick, self.level(_RST) & on)
         if on:
             self.start(tick)
+            self._see_bus(tick)
+        else:
+            self.chip.set_bus(tick, 1, 1, 1, 1, 0xFF)
+            self.timing.rest(0, 0, 1, 0xFF)
+            self.contention = 0
         self._answer()
 
     def due(self, tick: int) -> None:
@@ -110,6 +120,8 @@ class Lm629Part(Part):
     def changed(self, pins: int, tick: int) -> None:
         if pins & _BUS:
             self._see_bus(tick)
+        if pins & self.pulled:  # what changes behind a low of this chip comes to it alone
+            self._show_others(tick)
         if pins & (_PHASES | _INDEX):
             self._see_encoder(tick, pins)
         self._answer()
@@ -136,14 +148,16 @@ class Lm629Part(Part):
         if len(chip.commands) > _KEPT:
             del chip.commands[: _KEPT // 2]
 
+    def _show_others(self, tick: int) -> None:
+        for other in self.others_on_bus:
+            other._see_bus(tick)
+
     def _data(self) -> int:
-        """D7 to D0 without what this chip and others drive. Bits that two chips pull low stay as they were."""
+        """D7 to D0 without what this chip and others drive: of each bit, as who pulls it low sees it."""
         data = self.outside & 0xFF
         for other in self.others_on_bus:
             theirs = other._lows()
-            if theirs:
-                both = theirs & self._lows()
-                data = data & ~theirs | other.outside & theirs & ~both | self.chip.port.data & both
+            data = data & ~theirs | other.outside & theirs
         return data
 
     def _lows(self) -> int:
@@ -178,11 +192,8 @@ class Lm629Part(Part):
     def _answer(self) -> None:
         """The outputs as they are now, and when they may change by themselves."""
         chip = self.chip
-        shown = chip.port.drive if chip.port.reading else 0xFF
-        if self.shown != shown:
-            self.shown = shown
-            for pin in range(8):
-                self.drive(pin, RELEASED if shown >> pin & 1 else LOW)
+        if chip.port.reading or self.pulled:
+            self._pull(~chip.port.drive & 0xFF if chip.port.reading else 0)
         self.drive(_HI, chip.hi)
         self.drive(_MAG, chip.pwm)
         self.drive(_SIGN, chip.sign)
@@ -192,6 +203,15 @@ class Lm629Part(Part):
         else:
             # Only HI comes to the host: at an unmasked sample, or when it falls.
             self.reach_tick = min(chip.hi_falls_tick, chip.sample_tick if chip.signals.mask else NEVER_TICK)
+
+    def _pull(self, lows: int) -> None:
+        """Pulls these data pins low, but for those that another chip pulls: it takes them over when that lets go."""
+        for other in self.others_on_bus:
+            lows &= ~other.pulled
+        if lows != self.pulled:
+            self.pulled = lows
+            for pin in range(8):
+                self.drive(pin, LOW if lows >> pin & 1 else RELEASED)
 
     def read(self, name: str, tick: int) -> float | int | bool | str:
         chip = self.chip
@@ -212,5 +232,5 @@ class Lm629Part(Part):
         if self.next_tick != min(chip.next_tick, chip.hi_falls_tick):
             raise ValueError(f"{self.name} has its next event at tick {self.next_tick}, its chip has not")
         chip.check_times(self.next_tick)
-        self.shown = 0xFF ^ self._lows()
+        self.pulled = self._lows()
         self.timing.rest(chip.port.writing, chip.port.reading, chip.port.ps, chip.port.data)

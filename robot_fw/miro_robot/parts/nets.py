@@ -209,6 +209,7 @@ class Nets:
         nets = {net for net in netlist.ports if net >= 0}
         nets.update(net for buffer in netlist.buffers for net in buffer)
         nets.update(net for net in range(self.count) if self._may_contend(net, netlist))
+        self.at_cpu = [int(net in nets) for net in range(288)]
         reaching: list[int] = []
         more = [-1]
         while more:
@@ -450,12 +451,20 @@ class Nets:
             raise PluginError(reason, "set next_tick beyond the tick of the call")
 
     def _check_reach(self, part: Part, tick: int) -> None:
-        """What a part does by itself must not reach a pin before the tick that it has given."""
+        """What a part does by itself must not come to the CPU before the tick that it has given."""
         reach_tick = self.reach_ticks[self.called]
-        if tick < reach_tick < _NEVER and self.called_why in (_DUE, _ADVANCE):
+        if tick < reach_tick < _NEVER and self.called_why in (_DUE, _ADVANCE) and self._at_cpu(part):
             self.called_pins = part.moved
             reason = f"drives its pin before its reach_tick {reach_tick}"
             raise PluginError(reason, "set reach_tick to the first tick at which a pin may change, or to 0")
+
+    def _at_cpu(self, part: Part) -> bool:
+        """Whether a pin that has moved is on a net with a port pin; by way of other parts it is theirs to say."""
+        for pin in range(MOST_PINS):
+            net = self.net_of[self.called * MOST_PINS + pin]
+            if part.moved >> pin & 1 and net >= 0 and self.at_cpu[net]:
+                return True
+        return False
 
     def _look_up(self, index: int, part: Part) -> None:
         """`next_tick`, `reach_tick` and driven pins of a part."""
@@ -561,10 +570,10 @@ class Nets:
             self._mark_pin(place)
 
     def _mark_pin(self, place: int) -> None:
-        """A part is to be called for one of its pins; without supply nobody is."""
+        """A part is to be called for one of its pins; without supply only what moves, and goes on, is."""
         index = self.pin_part[place]
         part = self.parts[index]
-        if self.powered:
+        if self.powered or part.continuous:
             part.pending |= 1 << self.pin_number[place]
             if not self.is_waiting[index]:
                 self._wait(index)

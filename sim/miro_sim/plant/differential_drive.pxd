@@ -13,6 +13,8 @@ cdef class DrivePart(Part):
     cdef Lm629Part left, right
     cdef int on
 
+    @cython.locals(chips_tick='long long')
+    cpdef advance(self, long long tick)
     cdef Lm629Part _chip_at(self, int pin)
     @cython.locals(side=int)
     cpdef changed(self, unsigned int pins, long long tick)

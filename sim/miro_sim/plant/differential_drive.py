@@ -110,7 +110,8 @@ class DrivePart(Part):
         self.plant.set_bridge(tick, side, levels & on & (forward ^ backward), forward)
 
     def advance(self, tick: int) -> None:
-        if self.left.chip.next_tick <= tick or self.right.chip.next_tick <= tick:
+        chips_tick = min(self.left.chip.next_tick, self.right.chip.next_tick)
+        if min(self.next_tick, chips_tick) <= tick:
             self.plant.advance(tick)
             self._wait()
 

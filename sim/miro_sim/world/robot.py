@@ -19,6 +19,9 @@ from miro_host.telemetry_receiver import LastTelemetry
 from miro_robot.board import Board
 from miro_robot.image import Image
 from miro_robot.lm629.chip import Lm629
+from miro_robot.lm629.options import Lm629Options
+from miro_robot.plant import Plant
+from miro_robot.processor_board import ProcessorBoard
 from miro_robot.wiring import load_wiring
 from miro_sim.periods import Axis, Control, RobotPeriod
 from miro_sim.pitch.contact import GRID_TICKS
@@ -49,8 +52,7 @@ class Robot(Device):
         except PluginError as error:
             raise _named(error, name, 0) from error
         strap = spec.slot if spec.strap is None else spec.strap
-        board = Board(load_wiring(), self.drive, strap, robots, scenario.lm629, scenario.stop_on_fault)
-        board.load(image)
+        board = make_board(self.drive, strap, robots, scenario.lm629, scenario.stop_on_fault, image=image)
         Device.__init__(self, board, network, spec.slot, image)
         self.board: Board
         self.note_from(NEVER_TICK)
@@ -115,6 +117,15 @@ class Robot(Device):
 
     def __repr__(self) -> str:
         return f"Robot(net{self.network}/robot{self.spec.slot}, {self.drive!r}, {self.board!r})"
+
+
+def make_board(
+    drive: Plant, slot: int, robots: int, options: Lm629Options, stop_on_fault: bool, *, image: Image
+) -> ProcessorBoard:
+    """The electronics of a robot. Tests put the net list that they are compared with in its place."""
+    board = Board(load_wiring(), drive, slot, robots, options, stop_on_fault)
+    board.load(image)
+    return board
 
 
 def _named(error: PluginError, robot: str, tick: int) -> PluginError:

@@ -61,7 +61,8 @@ class NetBoard(WiredBoard):
         return stopped
 
     def set_power(self, on):
-        self.sync(self.cpu.cycles * CYCLE_TICKS)
+        if on != self.powered:
+            self.sync(self.cpu.cycles * CYCLE_TICKS)
         WiredBoard.set_power(self, on)
 
     # What a `Board` keeps of its wires.
@@ -97,6 +98,14 @@ class NetBoard(WiredBoard):
     @property
     def contention(self):
         return self.sides[0].contention
+
+
+def settle(board):
+    """Chips and plant have done what is due by the end of the last instruction, as they will have by the next one.
+
+    At the end of a run they may be short of that, or a few ticks beyond its end: there the two boards differ.
+    """
+    board.sync(board.cpu.cycles * CYCLE_TICKS)
 
 
 def _entries():
