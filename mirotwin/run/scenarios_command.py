@@ -21,13 +21,17 @@ from mirotwin.verify.checks.expect import CHECKS, struct_of
 class ScenariosGroup(LazyGroup):
     """Tells what was meant where a scenario is named instead of a command."""
 
+    def shows(self, name: str) -> bool:
+        """Whether `show` takes this name."""
+        return name in scenario_file.builtin_names() or name.endswith(".toml")
+
     def resolve_command(
         self, ctx: click.Context, args: list[str]
     ) -> tuple[str | None, click.Command | None, list[str]]:
         name = args[0]
-        if name in scenario_file.builtin_names() or name.endswith(".toml"):
+        if self.shows(name):
             reason = f"No such command {shortened(repr(name))}"
-            ctx.fail(f"{reason}; did you mean `scenarios show {shortened(name)}`?")
+            ctx.fail(f"{reason}; did you mean `{ctx.info_name} show {shortened(name)}`?")
         return super().resolve_command(ctx, args)
 
 

@@ -164,6 +164,10 @@ def test_a_board_is_called_as_its_file_or_as_it_says(tmp_path):
             HEAD + '[parts.key]\npart = "button"\npins = { pin = "P1.1" }\nbounce_ms = 101',
             "parts.key.bounce_ms: 101 is out of range; must be <= 100.0 in milliseconds",
         ),
+        (
+            HEAD + '[parts.key]\npart = "button"\npins = { pin = "P0.1" }',
+            'parts.key.pins.pin: nothing can drive P0.1 high: P0 is open drain; add pull_ups = ["P0.1"]',
+        ),
         (HEAD + CTRL + CTRL.replace("CTRL", "B"), "latches.B: answers to address 0x8000, as latches.CTRL does"),
         (HEAD + "[latches.A]\naddress = 1\nmask = 2", "latches.A: address 0x0001 has bits that mask 0x0002 leaves"),
         (

@@ -11,7 +11,7 @@ from typing import Annotated, Any, Literal
 from msgspec import Meta
 
 from miro_exact.state import FLAG, TICK
-from miro_robot.parts.keys import HIGH, LOW, RELEASED, STRONG, PartKeys, Pin, Place
+from miro_robot.parts.keys import HIGH, LOW, OPEN_DRAIN, RELEASED, STRONG, PartKeys, Pin, Place
 from miro_robot.parts.part import Part
 
 _NEVER = 1 << 62
@@ -36,9 +36,8 @@ class Button(PartKeys, frozen=True, kw_only=True, tag="button"):
     rest: Literal["open", "closed"] = "open"
     bounce_ms: Annotated[float, Meta(ge=0.0, le=100.0)] = 0.0
 
-    @property
-    def pulled_up(self) -> tuple[str, ...]:
-        return ("pin",) if self.to == "vcc" else ()
+    def pin_kind(self, number: int) -> int:
+        return STRONG if self.to == "vcc" else OPEN_DRAIN
 
     def make(self, place: Place) -> Part:
         return ButtonPart(self, place)

@@ -60,6 +60,10 @@ class PartKeys(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_only=
     def name(self) -> str:
         return str(self.__struct_config__.tag)
 
+    def pin_kind(self, number: int) -> int:
+        """The kind of a pin of a part with these keys, which may be less than what its kind allows."""
+        return self.PINS[number].kind
+
     @property
     def pulled_up(self) -> tuple[str, ...]:
         """Pins that the part itself brings to VCC, as by a resistor: nobody else need drive them high."""

@@ -304,7 +304,7 @@ class _Resolver:
         return f"parts.{part}.pins.{self.spec.parts[part].keys.PINS[number].name}"
 
     def kind(self, part: str, number: int) -> int:
-        return self.spec.parts[part].keys.PINS[number].kind
+        return self.spec.parts[part].keys.pin_kind(number)
 
     def check_inverters(self, wire: _Wire) -> None:
         for part, number, inverted in wire.pins:
@@ -326,7 +326,7 @@ class _Resolver:
         strong = (STRONG,) if wire.ports else (STRONG, TWO_WAY)
         for part, number, _ in wire.pins:
             keys = self.spec.parts[part].keys
-            if keys.PINS[number].kind in strong or keys.PINS[number].name in keys.pulled_up:
+            if keys.pin_kind(number) in strong or keys.PINS[number].name in keys.pulled_up:
                 return
         if wire.pins or wire.buffers:
             place = self.place_of(*wire.pins[0][:2]) if wire.pins else wire.place
