@@ -46,19 +46,19 @@ NEVER_TICK = 1 << 62
 """Tick, or cycle, of an event that will not happen; no tick lies beyond it."""
 
 
-def ticks(seconds: float | Fraction) -> int:
+def ticks(seconds: float | Fraction, crystal_hz: int = TICKS_PER_SECOND) -> int:
     """Seconds to ticks, rounded half up.
 
     A float stands for the decimal number that it prints as (`repr`, the shortest one that reads back as the
     same float), so `0.001` is one millisecond exactly and not the binary fraction beside it; the product and
     the rounding are exact. Raises ValueError for NaN and infinities.
     """
-    return (2 * exact(seconds) * TICKS_PER_SECOND + 1) // 2
+    return (2 * exact(seconds) * crystal_hz + 1) // 2
 
 
-def ms(time: float | Fraction) -> int:
-    """Milliseconds to ticks, by the rule of `ticks`; a whole number of them is exact (24 000 ticks)."""
-    return ticks(exact(time) / 1000)
+def ms(time: float | Fraction, crystal_hz: int = TICKS_PER_SECOND) -> int:
+    """Milliseconds to ticks, by the rule of `ticks`; a whole number of them is exact at 24 MHz (24 000 ticks)."""
+    return ticks(exact(time) / 1000, crystal_hz)
 
 
 def us(time: float | Fraction) -> int:

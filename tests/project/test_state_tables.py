@@ -11,7 +11,7 @@ from miro_exact import places
 ROOT = Path(__file__).parents[2]
 FOLDERS = ("exact", "protocol", "robot_fw/miro_robot", "host", "sim")
 OBSERVERS = {"inspect", "engine.py", "fields.py", "state.py", "settings.py", "stream.py", "pcapng_reader.py"}
-OBSERVERS |= {"waits.py", "watch.py", "pin_watch.py"}
+OBSERVERS |= {"waits.py", "watch.py", "pin_watch.py", "followers.py", "changes.py"}
 """Files and rooms whose objects look at a run and are no part of it."""
 
 

@@ -10,6 +10,7 @@ from miro_protocol.actions import PutValue
 from miro_robot.event_log import TRUE
 from miro_robot.image import Image
 from miro_robot.processor_board import ProcessorBoard
+from miro_sim.world.conditions import PORT_PINS, unknown_robot_pin
 from miro_sim.world.events import BoardLog
 
 COUNTERS = ("frames_accepted", "frames_rejected", "frames_stale")
@@ -33,6 +34,8 @@ class Device:
         "counter_addresses",
         "pin_moves",
     )
+
+    changes: Any = None  # of a board with nets: what its nets and parts do
 
     def __init__(self, board: ProcessorBoard, network: int, slot: int, image: Image) -> None:
         self.board = board
@@ -90,6 +93,17 @@ class Device:
     def values(self) -> dict[str, float | int | bool | str]:
         """All values of its parts as they are now, by path."""
         return {}
+
+    # Pins
+
+    def check_pin(self, name: str) -> None:
+        """Raises ValueError for a pin that the board does not have."""
+        if reason := unknown_robot_pin(name):
+            raise ValueError(reason)
+
+    def port_pin(self, name: str) -> tuple[int, int]:
+        """Port and bit of a port pin."""
+        return PORT_PINS[name]
 
     def sample_tick(self) -> int:
         """The next tick for predicates that are not evaluated after each instruction."""

@@ -13,6 +13,11 @@ fault       the firmware did what it must not                             value 
 reached     the instruction at an address is next                         address
 ended       no input can make the program go on, and all is sent         address
 edge        a pin changes                                                 pin, value (the new level)
+level       a pin has a level for a time, as somebody waits for           pin, measured (milliseconds)
+pulse       a pulse ends, a period ends, as somebody waits for            pin, measured (us, Hz, share)
+  frequency, duty
+value       a value of a part is as somebody waits for                    pin (its path), measured
+text        a text has come that somebody waits for                       data (which), measured
 true        a predicate is true                                           -
 wheel_lost  a position error makes an LM629 switch its motor off          side
 reset       the level at a robot's reset pin is set                       value, slot
@@ -43,6 +48,8 @@ PC = -1
 """Slot of what happens at the PC."""
 SIDES = ("left", "right")
 KEPT = 4096
+MEASURES = {"level": " ms", "pulse": " us", "frequency": " Hz", "duty": " high"}
+"""The unit of what was measured at a pin, by the kind of event."""
 Symbol = tuple[int, bool, int]
 """Character, whether its stop bit was good, start tick."""
 
@@ -61,6 +68,7 @@ class Event(msgspec.Struct, frozen=True, kw_only=True, gc=False):
     opcode: int = -1
     address: int = -1
     pin: str = ""
+    measured: float | str | None = None
     other: tuple[int, int] | None = None
     frame: Received | None = None
 
@@ -83,6 +91,12 @@ class Event(msgspec.Struct, frozen=True, kw_only=True, gc=False):
             return f" {self.side}"
         if self.what == "edge":
             return f" {self.pin} to {self.value}"
+        if self.what == "text":
+            return f" {self.measured!r}"
+        if self.what == "value":
+            return f" {self.pin} = {self.measured}"
+        if self.what in MEASURES:
+            return f" {self.pin}, {self.measured:.6g}{MEASURES[self.what]}"
         if self.what in ("reached", "fault", "ended"):
             return f" {self.address:#06x}"
         if self.what in ("reset", "power"):

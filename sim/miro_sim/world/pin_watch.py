@@ -9,7 +9,6 @@ from operator import itemgetter
 from miro_robot.board import Board
 from miro_robot.inspect.tap import OUTSIDE, PLACES, CpuTap, port_pins
 from miro_robot.inspect.watcher import attach, detach
-from miro_sim.world.conditions import PORT_PINS
 from miro_sim.world.device import Device
 from miro_sim.world.events import Event
 from miro_sim.world.watch import EDGES, Entry
@@ -27,13 +26,14 @@ class PinWatch:
         self.board = board
         self.moves = device.pin_moves
         self.pins = sorted(pins)
+        self._ports = {pin: device.port_pin(pin) for pin in pins if pin not in _PLACE}
         self.tap = CpuTap(board if isinstance(board, Board) else None, lambda: None)
         attach(board.cpu, self.tap)
         self._levels = list(self.tap.start)
         self._moved = bisect_right(self.moves, self.tap.begin_tick, key=_BY_TICK)
         for _, port, levels in self.moves[: self._moved]:
             self._levels[OUTSIDE + port] = levels
-        self._shown = {pin: self._level(pin) for pin in self.pins}
+        self.shown = {pin: self._level(pin) for pin in self.pins}
 
     def close(self) -> None:
         detach(self.board.cpu, self.tap)
@@ -54,15 +54,15 @@ class PinWatch:
                 self._levels[place] = level
             for number, pin in enumerate(self.pins):
                 level = self._level(pin)
-                if level != self._shown[pin]:
-                    self._shown[pin] = level
+                if level != self.shown[pin]:
+                    self.shown[pin] = level
                     edge = Event(tick=tick, what="edge", network=network, slot=slot, pin=pin, value=level)
                     entries.append(((tick, network, slot, EDGES + number), edge))
         del events[:done]
         return entries
 
     def _level(self, pin: str) -> int:
-        if pin not in PORT_PINS:
+        if pin in _PLACE:
             return self._levels[_PLACE[pin]]
-        port, bit = PORT_PINS[pin]
+        port, bit = self._ports[pin]
         return port_pins(self._levels, port) >> bit & 1

@@ -19,24 +19,33 @@ from miro_protocol.decoder import Decoder, Received
 from miro_sim.world.conditions import Condition
 from miro_sim.world.events import PC, Cursor, Event
 from miro_sim.world.machine import Machine, require
-from miro_sim.world.watch import Entry, Watch
+from miro_sim.world.watch import FOLLOWED, Entry, Watch
 
-Before = tuple[int, list[int], list[bytes], Any]
+Before = tuple[int, list[int], list[bytes], Any, Any]
 FIRST_PIECE_TICKS = 24_000
 """1 ms. Pieces double up to the end of the control period: most waits are short, and a piece costs a snapshot."""
 SEEN_AT_MOST = 1000
 
 
 class WaitExpired(TimeoutError):
-    """The wait that began at `begun_tick` ran out. `seen`: the last events meanwhile, at most 1000."""
+    """The wait that began at `begun_tick` ran out. `seen`: the last events meanwhile, at most 1000; `found`: what pins,
+    values and text were instead, in words.
+    """
 
     def __init__(
-        self, conditions: Sequence[Condition], begun_tick: int, tick: int, why: str, seen: Sequence[Event]
+        self,
+        conditions: Sequence[Condition],
+        begun_tick: int,
+        tick: int,
+        why: str,
+        seen: Sequence[Event],
+        found: str = "",
     ) -> None:
         self.conditions = tuple(conditions)
         self.begun_tick = begun_tick
         self.tick = tick
         self.seen = list(seen)
+        self.found = found
         wanted = " or ".join(map(str, conditions))
         last = (
             f"; the last of {len(self.seen)} events: {self.seen[-1]}" if self.seen else "; nothing happened"
@@ -62,6 +71,8 @@ class Waits:
         self.reached: dict[tuple[int, int], int] = {}
         self.decoders: dict[tuple[int, int], Decoder] = {}  # made by the first wait
         self.states: list[Flat] = []
+        self.ended_tick = -1  # of the event with which the last wait ended
+        self.ended_pins: list[str] = []  # of the waits that ended there
         for index, line in enumerate(self.world.lines):
             self.cursors[index, PC] = Cursor(line.log)
             for device in line.devices:
@@ -87,22 +98,33 @@ class Waits:
         begun_tick = world.tick
         deadline = NEVER_TICK if within is None else world.tick + within
         events: list[Event] = []
-        with Watch(world, conditions) as watch:
+        with Watch(world, conditions, self.ended_tick, self.ended_pins) as watch:
             self.backlog += watch.true_now()
+            self.backlog.sort(key=itemgetter(0))
+            self.backlog += watch.matches(self.backlog)
             self._gather(watch)
             event = self._consume(watch, world.tick, events)
             piece = FIRST_PIECE_TICKS
             while event is None:
                 if world.finished or world.tick >= deadline:
                     why = "the run ended" if world.finished else f"{within} ticks passed"
-                    raise WaitExpired(conditions, begun_tick, world.tick, why, events)
+                    self._forget_followed()
+                    raise WaitExpired(conditions, begun_tick, world.tick, why, events, watch.found())
                 self._run_piece(watch, min(deadline, world.tick + piece))
                 if world.in_period and (world.tick == world.period_end or world.stopped):
                     world.end_period()
                 event = self._consume(watch, world.tick, events)
                 piece *= 2
             self.backlog += watch.edges(beyond=True)
+            self._forget_followed()
+        if event.tick != self.ended_tick:
+            self.ended_tick, self.ended_pins = event.tick, []
+        self.ended_pins.append(event.pin)
         return event
+
+    def _forget_followed(self) -> None:
+        """What followers found beyond the end of a wait: those of the next wait find it again."""
+        self.backlog = [entry for entry in self.backlog if entry[0][3] < FOLLOWED and entry[1].what != "text"]
 
     def _run_piece(self, watch: Watch, until_tick: int) -> None:
         """Runs to `until_tick`, the end of the control period, or the first event that is wanted."""
@@ -110,7 +132,8 @@ class Waits:
         world.begin_period()
         until_tick = world.rendezvous(until_tick)
         read = [cursor.next for cursor in self.cursors.values()]
-        before = len(self.backlog), read, [state.save() for state in self.states], world.mark()
+        states = [state.save() for state in self.states]
+        before = len(self.backlog), read, states, watch.save(), world.mark()
         begun_tick = world.tick
         world.run_piece(until_tick)
         self._gather(watch)
@@ -130,13 +153,14 @@ class Waits:
 
     def _again_to(self, watch: Watch, before: Before, tick: int) -> None:
         """Goes back and runs the piece again, to `tick`."""
-        count, read, states, mark = before
+        count, read, states, followers, mark = before
         self.world.go_back(mark)
         del self.backlog[count:]
         for cursor, serial in zip(self.cursors.values(), read, strict=True):
             cursor.next = serial
         for state, saved in zip(self.states, states, strict=True):
             state.load(saved)
+        watch.load(followers)
         watch.pick_up()
         self.world.run_piece(tick)
         self._gather(watch)
@@ -169,17 +193,20 @@ class Waits:
                 for device in line.devices if line.log.robots else ():
                     self.decoders[index, device.slot] = Decoder(line.log.robots)
             self.states = [Flat(decoder) for decoder in self.decoders.values()]
+        new: list[Entry] = []
         for source, cursor in self.cursors.items():
             for serial, event in cursor.read():
                 if event.what == "reached" and self.reached.get(source) == event.value:
                     continue  # a wait has ended before this instruction already
                 key = (event.tick, *source, serial)
-                self.backlog.append((key, event))
+                new.append((key, event))
                 if event.what != "received" or source not in self.decoders:
                     continue
                 symbol = (event.value, event.good_stop, event.tick)
                 for result in self.decoders[source].feed_symbols([symbol]):
                     if isinstance(result, Received):
                         frame = msgspec.structs.replace(event, what="frame", value=0, frame=result)
-                        self.backlog.append((key, frame))
-        self.backlog += watch.edges()
+                        new.append((key, frame))
+        new += watch.edges()
+        self.backlog += new
+        self.backlog += watch.matches(new)

@@ -1,40 +1,77 @@
-"""What has to be watched for the conditions of one wait: marked addresses, pins, predicates."""
+"""What has to be watched for the conditions of one wait: marked addresses, pins, values, text, predicates."""
 
 from __future__ import annotations
 
-from collections.abc import Sequence
-from typing import TYPE_CHECKING
+from collections.abc import Iterable, Sequence
+from typing import TYPE_CHECKING, Any, NamedTuple
 
 import msgspec
 
 from miro_exact.clock import CYCLE_TICKS
 from miro_protocol.toml_text import struct_of
-from miro_sim.world.conditions import CONDITIONS, Condition, Edge, Reached, WheelSpeeds, When
+from miro_sim.world.conditions import (
+    CONDITIONS,
+    Condition,
+    Edge,
+    Followed,
+    OfPin,
+    Reached,
+    Text,
+    Value,
+    WheelSpeeds,
+    When,
+)
 from miro_sim.world.events import PC, Event
+from miro_sim.world.followers import Change, Follower, TextFollower
 from miro_sim.world.machine import no_network
 
 if TYPE_CHECKING:
+    from miro_sim.world.changes import Changes
     from miro_sim.world.machine import Machine
     from miro_sim.world.pin_watch import PinWatch
 
-EDGES, _TRUE = 1 << 40, 1 << 41
-"""Serial numbers of what is in no log: an edge adds the place of its pin, since at one tick there is one of each."""
+EDGES, _TRUE, FOLLOWED = 1 << 40, 1 << 41, 1 << 42
+"""Serial numbers of what is in no log: an edge adds the place of its pin, since at one tick there is one of each; what
+a follower found adds its number.
+"""
 Entry = tuple[tuple[int, int, int, int], Event]
 """An event and what it is sorted by: (tick, network, slot, serial number in its log)."""
 
 
-class Watch:
-    """A context: within it the robots of a machine look out for `conditions`.
-
-    Raises ValueError for a network, slot or symbol that is not there. `conditions`: each with network and slot.
+class Followers(NamedTuple):
+    """A follower and its condition. `changes`: of the board, where it keeps those of its nets and values; None: the
+    follower gets edges and characters that a wait has as events.
     """
 
-    def __init__(self, world: Machine, conditions: Sequence[Condition]) -> None:
+    condition: Followed | Text
+    robot_id: tuple[int, int]
+    follower: Follower
+    changes: Changes | None = None
+
+
+class Watch:
+    """A context: within it the devices of a machine look out for `conditions`.
+
+    Raises ValueError for a network, slot, pin, value or symbol that is not there. `conditions`: each with network and
+    slot. `after_tick`: of the event with which the wait before ended; `after_pins`: of waits that ended on that tick.
+    """
+
+    def __init__(
+        self,
+        world: Machine,
+        conditions: Sequence[Condition],
+        after_tick: int = -1,
+        after_pins: Sequence[str] = (),
+    ) -> None:
         self.world = world
         self.conditions = [
             (self._robot_id(condition), self._with_address(condition)) for condition in conditions
         ]
+        self.after_tick = after_tick
+        self.after_pins = after_pins
         self.pins: list[PinWatch] = []
+        self.followers: list[Followers] = []
+        self.read: list[int] = []  # by follower: the serial number of the next change
 
     def __enter__(self) -> Watch:
         for robot_id, condition in self.conditions:
@@ -45,6 +82,13 @@ class Watch:
             elif isinstance(condition, When | WheelSpeeds):
                 self.world.device(*robot_id).asked.append((condition.predicate, condition.at))
         self.pick_up()
+        for robot_id, condition in self.conditions:
+            if isinstance(condition, Text):
+                follower: Follower = TextFollower(condition, robot_id, self.world.clock)
+                self.followers.append(Followers(condition, robot_id, follower))
+            elif isinstance(condition, Followed):
+                self._follow(condition, robot_id)
+        self.read += [0] * (len(self.followers) - len(self.read))
         return self
 
     def __exit__(self, *raised: object) -> None:
@@ -60,14 +104,14 @@ class Watch:
                 return True
         return False
 
-    # Pins
+    # Pins of boards without nets
 
     def pick_up(self) -> None:
         """Picks the pins up where the world is now."""
         self._close_pins()
         pins: dict[tuple[int, int], set[str]] = {}
         for robot_id, condition in self.conditions:
-            if isinstance(condition, Edge):
+            if isinstance(condition, OfPin) and changes_of(self.world, robot_id) is None:
                 pins.setdefault(robot_id, set()).add(condition.pin)
         if not pins:
             return
@@ -91,6 +135,76 @@ class Watch:
         for pins in self.pins:
             pins.close()
         self.pins = []
+
+    # Followers
+
+    def _follow(self, condition: Followed, robot_id: tuple[int, int]) -> None:
+        """Begins with the level of the pin, or with the value, of now: or of the tick at which the last wait ended."""
+        changes, tick, clock = changes_of(self.world, robot_id), self.world.tick, self.world.clock
+        if changes is None:
+            if not isinstance(condition, Edge):  # an edge is an event as it stands
+                assert isinstance(condition, OfPin)
+                (level,) = (pins.shown[condition.pin] for pins in self.pins if pins.robot_id == robot_id)
+                follower = condition.follower(condition.pin, 0, clock, tick, level)
+                self.followers.append(Followers(condition, robot_id, follower))
+            return
+        if isinstance(condition, OfPin):
+            place = changes.find(condition.pin)
+            if tick - 1 == self.after_tick and condition.pin not in self.after_pins:
+                tick = self.after_tick
+            level, serial = changes.level_before(place.net, tick)
+            flip = int(place.inverted)
+            follower = condition.follower(place.net, flip, clock, tick, level ^ flip)
+        else:
+            value, serial = changes.watch_value(condition.source, tick), changes.values.end
+            follower = condition.follower(condition.source, 0, clock, tick, value)
+        self.followers.append(Followers(condition, robot_id, follower, changes))
+        self.read.append(serial)
+
+    def matches(self, entries: Iterable[Entry]) -> list[Entry]:
+        """What the followers make of `entries`, which are new, and of what their boards have kept."""
+        if not self.followers:
+            return []
+        pins: list[Change] = []
+        text: list[Change] = []
+        serials: dict[tuple[int, Any], int] = {}
+        for key, event in entries:
+            if event.what == "edge":
+                pins.append((event.tick, event.pin, event.value))
+            elif event.what == "heard":
+                source = event.network, event.slot
+                text.append((event.tick, source, event.value))
+                serials[event.tick, source] = key[3]
+        found: list[Entry] = []
+        tick = self.world.tick
+        for number, (condition, robot_id, follower, changes) in enumerate(self.followers):
+            new = text if isinstance(condition, Text) else pins
+            if changes is not None:
+                of_value = isinstance(condition, Value)
+                log = changes.values if of_value else changes.edges
+                new = log.since(self.read[number], tick + of_value)  # a value of this tick is known
+                self.read[number] = max(self.read[number], log.first) + len(new)
+            for when, measured in follower.feed(new, tick):
+                serial = serials.get((when, follower.source), FOLLOWED + number)
+                found.append(((when, *robot_id, serial), _event(condition, when, robot_id, measured)))
+        return found
+
+    def save(self) -> Any:
+        """Where the followers are, to go back to with `load`."""
+        return list(self.read), [one.follower.save() for one in self.followers]
+
+    def load(self, saved: Any) -> None:
+        self.read = list(saved[0])
+        for one, state in zip(self.followers, saved[1], strict=True):
+            one.follower.load(state)
+
+    def found(self) -> str:
+        """What the followers have seen instead of what was wanted."""
+        texts = [
+            f"{f'{one.condition.source}: ' if isinstance(one.condition, OfPin) else ''}{one.follower.found()}"
+            for one in self.followers
+        ]
+        return "; ".join(dict.fromkeys(texts))
 
     # Predicates
 
@@ -117,7 +231,11 @@ class Watch:
         if isinstance(condition, WheelSpeeds):
             self.world.robot(condition.network, slot)
         elif slot != PC:
-            self.world.device(condition.network, slot)
+            device = self.world.device(condition.network, slot)
+            if isinstance(condition, OfPin):
+                device.check_pin(condition.pin)
+            elif isinstance(condition, Value):
+                device.value(condition.of)
         return condition.network, slot
 
     def _with_address(self, condition: Condition) -> Condition:
@@ -127,3 +245,19 @@ class Watch:
         image = self.world.image
         assert image is not None  # a machine with an inside
         return msgspec.structs.replace(condition, symbol=None, address=image.code_address(condition.symbol))
+
+
+def changes_of(world: Machine, robot_id: tuple[int, int]) -> Changes | None:
+    """What the board of a device keeps of its nets and values; None for one without."""
+    changes: Changes | None = world.device(*robot_id).changes
+    return changes
+
+
+def _event(condition: Followed | Text, tick: int, robot_id: tuple[int, int], measured: Any) -> Event:
+    network, slot = robot_id
+    event = Event(tick=tick, what=condition.what, network=network, slot=slot, measured=measured)
+    if isinstance(condition, Text):
+        return msgspec.structs.replace(event, data=condition.key)
+    if isinstance(condition, Edge):
+        return msgspec.structs.replace(event, pin=condition.source, value=measured, measured=None)
+    return msgspec.structs.replace(event, pin=condition.source, value=getattr(condition, "level", 0))

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
+from typing import Any
 
 from miro_exact.clock import CHARACTER_BITS, CYCLE_TICKS
 from miro_exact.state import TICK
@@ -12,11 +13,13 @@ from miro_robot.build import board_of
 from miro_robot.empty_board import EmptyBoard
 from miro_robot.image import Image
 from miro_robot.mcs51.cpu import STOPPED
+from miro_robot.parts.netlist import Netlist
 from miro_robot.parts.values import checked_put, checked_read
 from miro_robot.wired_board import WiredBoard
 from miro_sim.periods import PartValues
 from miro_sim.scenario.board import FASTEST_BIT_TICKS, BoardScenario
 from miro_sim.world.actions import SETTLE_TICKS
+from miro_sim.world.changes import Changes, PinPlace, find_pin
 from miro_sim.world.device import Device
 from miro_sim.world.events import HostLog
 from miro_sim.world.medium import Medium, sent_to
@@ -27,15 +30,27 @@ _STOP = CHARACTER_BITS - 1
 
 
 class BoardAlone(Device):
-    """A board on a wire. `parts`: the keys of those that are on it, by name."""
+    """A board on a wire. `parts`: the keys of those that are on it, by name. `changes`: for who watches it."""
 
-    NOT_STATE = ("sample_ticks", "parts")
+    NOT_STATE = ("sample_ticks", "parts", "changes")
 
     def __init__(self, board: EmptyBoard, network: int, image: Image) -> None:
         Device.__init__(self, board, network, 0, image)
         self.board: EmptyBoard
         self.sample_ticks = board.spec.crystal_hz // 1000
         self.parts = {part.name: part.keys for part in board.parts} if isinstance(board, WiredBoard) else {}
+        self.changes = Changes(self, board) if isinstance(board, WiredBoard) else None
+
+    def run(self, tick: int) -> int:
+        changes = self.changes
+        if changes is None or not changes.now:
+            return Device.run(self, tick)
+        stopped = 0
+        while not stopped and changes.look_tick <= tick:
+            stopped = Device.run(self, changes.look_tick)
+            if not stopped:
+                changes.look_at_grid()
+        return stopped or Device.run(self, tick)
 
     def check_put(self, path: str, value: PutValue) -> None:
         checked_put(self.parts, path, value)
@@ -43,6 +58,8 @@ class BoardAlone(Device):
     def put(self, path: str, value: PutValue, tick: int) -> None:
         part, key, taken = checked_put(self.parts, path, value)
         self._wired.put(part, key, taken, tick)
+        if self.changes is not None:
+            self.changes.look(tick)
 
     def value(self, path: str) -> float | int | bool | str:
         part, key = checked_read(self.parts, path)
@@ -59,6 +76,29 @@ class BoardAlone(Device):
     def _wired(self) -> WiredBoard:
         assert isinstance(self.board, WiredBoard), "a board without parts has no values"
         return self.board
+
+    # Pins
+
+    def find_pin(self, name: str) -> PinPlace:
+        """Where the name of a pin leads. Raises ValueError."""
+        netlist = self.board.nets.netlist if isinstance(self.board, WiredBoard) else Netlist()
+        return find_pin(self.board.spec, netlist, name)
+
+    def check_pin(self, name: str) -> None:
+        self.find_pin(name)
+
+    def port_pin(self, name: str) -> tuple[int, int]:
+        return divmod(self.find_pin(name).port_pin, 8)
+
+    # Going back
+
+    def records(self) -> list[Any]:
+        return [*Device.records(self), self.changes and self.changes.records()]
+
+    def put_back(self, records: list[Any]) -> None:
+        Device.put_back(self, records)
+        if self.changes is not None:
+            self.changes.put_back(records[-1])
 
     def sample_tick(self) -> int:
         """Every millisecond."""
@@ -121,6 +161,9 @@ class Wire(Medium):
     def begin_period(self, tick: int) -> None:
         Medium.begin_period(self, tick)
         self.board.begin_period()
+        for device in self.devices:
+            if device.changes is not None:
+                device.changes.trim()
 
     def inject(self, data: bytes, at_tick: int | None, now: int, bad_stop: tuple[int, ...]) -> int:
         """See `World.inject`."""

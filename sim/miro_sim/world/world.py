@@ -416,6 +416,9 @@ class World:
         if self.bodies is not None:
             self.bodies.start_at(self.tick)
         self.waits.forget()
+        for device in self.devices:
+            if device.changes is not None:
+                device.changes.restart(self.tick)
 
     def after_load(self) -> None:
         """Raises ValueError unless all parties stand where the world does."""
