@@ -223,9 +223,9 @@ class Monitor(Generic[C_co]):
         return f"{type(self).__name__}({self.check!r}, judged={self.judged}, failed={self.failed})"
 
 
-def ms_ticks(time_ms: float) -> int:
-    """Ticks of so many milliseconds, which need not be whole."""
-    return ticks(time_ms / 1000.0)
+def ms_ticks(time_ms: float, clock: int = TICKS_PER_SECOND) -> int:
+    """Ticks of so many milliseconds, which need not be whole; rounded half up."""
+    return ticks(time_ms / 1000.0, clock)
 
 
 def in_ms(duration_ticks: int, clock: int = TICKS_PER_SECOND) -> str:

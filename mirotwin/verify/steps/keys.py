@@ -8,6 +8,7 @@ What a step leaves is an attribute of `Player`; `Run.result` and `play_at_port` 
 from __future__ import annotations
 
 import re
+from collections.abc import Iterator, Mapping
 from typing import TYPE_CHECKING, Annotated, Any, ClassVar, Literal
 
 import msgspec
@@ -21,14 +22,33 @@ from miro_exact.clock import (
     TICKS_PER_SECOND,
 )
 from miro_host.wheels import UNITS_PER_COUNT, Wheels, nearest
-from miro_protocol.actions import Power, RadioState, Reset
+from miro_protocol.actions import Power, PutValue, RadioState, Reset
 from miro_protocol.frames import ServiceFrame, TeamFrame
 from miro_protocol.table import DOWNLINK, SEQ_MODULUS, Opcode
-from miro_sim.world.conditions import Edge, Network, Reached, Recorded, Slot, SpeedMS, WheelSpeeds
+from miro_robot.parts.resolve import resolve
+from miro_robot.parts.values import checked_put, checked_read
+from miro_sim.world.changes import find_pin
+from miro_sim.world.conditions import (
+    BOTH,
+    Followed,
+    Kind,
+    Network,
+    OfPin,
+    OnBoard,
+    Reached,
+    Recorded,
+    Slot,
+    SpeedMS,
+    Value,
+    WheelSpeeds,
+    unknown_robot_pin,
+)
+from miro_sim.world.followers import shown
 from miro_sim.world.machine import Feature
 from mirotwin.verify.checks.interface import Check, in_ms, ms_ticks
 
 if TYPE_CHECKING:
+    from miro_sim.scenario.board import BoardScenario
     from miro_sim.scenario.keys import NetworkSpec as ScenarioNetwork
     from mirotwin.verify.steps.player import Host, Player
 
@@ -41,7 +61,8 @@ FILE = re.compile(r"[A-Za-z0-9_-]{1,64}\.world")
 LONGEST_MS = 86_400_000.0
 PauseMs = Annotated[float, Meta(gt=0.0, le=LONGEST_MS)]
 WithinMs = Annotated[float, Meta(ge=0.0, le=LONGEST_MS)]
-Awaited = Recorded | WheelSpeeds | Edge | Reached
+GapMs = Annotated[float, Meta(ge=0.0, le=60_000.0)]
+Awaited = Recorded | WheelSpeeds | Reached | OnBoard
 
 
 class Step(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_only=True):
@@ -52,6 +73,8 @@ class Step(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_only=True
     """Whether later steps depend on this one."""
     NEEDS: ClassVar[Feature | None] = None
     """The feature of the machine that the step needs."""
+    SUBJECTS: ClassVar[tuple[Kind, ...]] = BOTH
+    """What it can be done with: robots, a board alone."""
 
     number: int = 0
     note: str = ""
@@ -66,18 +89,27 @@ class Step(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_only=True
         """The network of the step: by its key, or by the condition that it waits for."""
         return getattr(self, "network_", None) or 0
 
+    @property
+    def subjects(self) -> tuple[Kind, ...]:
+        """What it can be done with, by all its keys."""
+        return self.SUBJECTS
+
     def problem(self, network: ScenarioNetwork) -> str:
-        """Why it cannot be done in this network, as `key: what; remedy`, or the empty string."""
+        """Why it cannot be done in this network of robots, as `key: what; remedy`, or the empty string."""
         return absent(getattr(self, "slot", None), network)
+
+    def problem_alone(self, scenario: BoardScenario) -> str:
+        """The same with the board of a scenario."""
+        return ""
 
     def do(self, player: Player) -> None:
         """Does it, and lets time pass as far as it says."""
         raise NotImplementedError
 
     @property
-    def lasts_ticks(self) -> int:
+    def lasts_ms(self) -> float:
         """How long it takes at least."""
-        return ms_ticks(getattr(self, "for_ms", 0.0))
+        return float(getattr(self, "for_ms", 0.0))
 
     def in_words(self) -> str:
         """The step in a few words."""
@@ -120,6 +152,8 @@ class SendFrame(Send, frozen=True, kw_only=True):
     the first of HDR in the order in which they are sent; `bad_stop`: characters whose stop bit is space, counted from
     the first of the preamble. `slot`: left out, the network's first robot.
     """
+
+    SUBJECTS = ("robot",)
 
     slot: Slot | None = None
     seq: Annotated[int, Meta(ge=0, lt=SEQ_MODULUS)] | None = None
@@ -231,12 +265,47 @@ def acceleration_units(acceleration_m_s2: float) -> int:
     return nearest(65536.0 * counts_per_m * sample_s * sample_s * acceleration_m_s2)
 
 
-class SendBytes(Send, frozen=True, kw_only=True, tag="bytes"):
+class SendCharacters(Send, frozen=True, kw_only=True):
+    """Base of characters as they are. `gap_ms`: between two of them, to a board; left out, none."""
+
+    gap_ms: GapMs | None = None
+
+    def problem(self, network: ScenarioNetwork) -> str:
+        if self.gap_ms is not None:
+            return "gap_ms: is for a board; a network's host sends without a gap, so make it several steps"
+        return self.problem_of_text()
+
+    def problem_alone(self, scenario: BoardScenario) -> str:
+        return self.problem_of_text()
+
+    def problem_of_text(self) -> str:
+        """Why these are no characters, or the empty string."""
+        return ""
+
+    def characters(self) -> tuple[bytes, tuple[int, ...]]:
+        """The bytes, and the indices of those whose stop bit is bad."""
+        raise NotImplementedError
+
+    def do(self, player: Player) -> None:
+        data, bad_stop = self.characters()
+        machine = player.machine
+        if not self.gap_ms:
+            machine.inject(data, self.network, bad_stop=bad_stop)
+            return
+        at_tick = None
+        for index in range(len(data)):
+            bad = (0,) if index in bad_stop else ()
+            tick = machine.inject(data[index : index + 1], self.network, at_tick, bad)
+            character_ticks = player.world.lines[self.network].outbox.character_ticks
+            at_tick = tick + character_ticks + ms_ticks(self.gap_ms, machine.clock)
+
+
+class SendBytes(SendCharacters, frozen=True, kw_only=True, tag="bytes"):
     """Characters as they are: pairs of hex digits, a `!` after one whose stop bit is bad (`55 55! ff`)."""
 
     hex: str
 
-    def problem(self, network: ScenarioNetwork) -> str:
+    def problem_of_text(self) -> str:
         words = self.hex.split()
         for word in words:
             if not CHARACTER.fullmatch(word):
@@ -244,19 +313,28 @@ class SendBytes(Send, frozen=True, kw_only=True, tag="bytes"):
         return "" if words else "hex: there is no character; write two hex digits for each"
 
     def characters(self) -> tuple[bytes, tuple[int, ...]]:
-        """The bytes, and the indices of those whose stop bit is bad."""
         words = self.hex.split()
         bad = tuple(at for at, word in enumerate(words) if word.endswith("!"))
         return bytes(int(word[:2], 16) for word in words), bad
 
-    def do(self, player: Player) -> None:
-        data, bad_stop = self.characters()
-        player.machine.inject(data, self.network, bad_stop=bad_stop)
+
+class SendText(SendCharacters, frozen=True, kw_only=True, tag="text"):
+    """A text in UTF-8, to a board."""
+
+    SUBJECTS = ("board",)
+
+    text: Annotated[str, Meta(min_length=1, max_length=4096)]
+
+    def characters(self) -> tuple[bytes, tuple[int, ...]]:
+        return self.text.encode(), ()
+
+    def in_words(self) -> str:
+        return f"send text {self.text[:40]!r}"
 
 
 SENDS: dict[str, type[Send]] = {
     str(struct.__struct_config__.tag): struct
-    for struct in (SendTeam, SendPoll, SendPing, SendFilter, SendAcceleration, SendBytes)
+    for struct in (SendTeam, SendPoll, SendPing, SendFilter, SendAcceleration, SendBytes, SendText)
 }
 
 
@@ -268,6 +346,7 @@ class StreamStep(OfRobot, frozen=True, kw_only=True):
     """
 
     VERB = "stream"
+    SUBJECTS = ("robot",)
 
     stream: Literal["on", "off"]
     every_ms: PauseMs | None = None
@@ -314,10 +393,27 @@ class ConditionStep(Step, frozen=True, kw_only=True):
     def network(self) -> int:
         return self.condition.network
 
+    @property
+    def subjects(self) -> tuple[Kind, ...]:
+        return self.condition.SUBJECTS
+
     def in_words(self) -> str:
         return f"{self.verb} {self.condition.what}"
 
+    def problem_alone(self, scenario: BoardScenario) -> str:
+        try:
+            if isinstance(self.condition, OfPin):
+                find_pin(scenario.board, resolve(scenario.board), self.condition.pin)
+            elif isinstance(self.condition, Value):
+                checked_read(scenario.parts, self.condition.of)
+        except ValueError as error:
+            key = "" if isinstance(self.condition, OfPin) else "of: "
+            return f"{key}{error}"
+        return ""
+
     def problem(self, network: ScenarioNetwork) -> str:
+        if isinstance(self.condition, OfPin) and (reason := unknown_robot_pin(self.condition.pin)):
+            return reason
         return absent(getattr(self.condition, "slot", None), network)
 
 
@@ -336,12 +432,18 @@ class WaitStep(ConditionStep, frozen=True, kw_only=True):
 
 
 class HoldStep(ConditionStep, frozen=True, kw_only=True):
-    """For so long from now on, `never`: no event that fits; `hold = "wheels"`: they turn as fast as this."""
+    """For so long from now on, `never`: no event that fits; `hold`: what is true now stays so."""
 
     for_ms: PauseMs
 
     def do(self, player: Player) -> None:
         player.hold(self.condition, self.for_ms, self.verb != "hold")
+
+    def forbidden(self) -> Awaited | None:
+        """The condition that must not become true; None where only a predicate says it."""
+        if self.verb != "hold":
+            return self.condition
+        return self.condition.opposite() if isinstance(self.condition, Followed) else None
 
 
 class SilenceStep(HoldStep, frozen=True, kw_only=True):
@@ -359,8 +461,8 @@ class PauseStep(Step, frozen=True, kw_only=True):
     pause_ms: PauseMs
 
     @property
-    def lasts_ticks(self) -> int:
-        return ms_ticks(self.pause_ms)
+    def lasts_ms(self) -> float:
+        return self.pause_ms
 
     def do(self, player: Player) -> None:
         player.pause(self.pause_ms)
@@ -394,6 +496,7 @@ class RadioStep(OfNetwork, frozen=True, kw_only=True):
 
     VERB = "radio"
     NEEDS = "switch"
+    SUBJECTS = ("robot",)
 
     radio: Literal["up", "down", "noise"]
 
@@ -448,9 +551,74 @@ class SaveStep(Step, frozen=True, kw_only=True):
         player.saved[self.save] = player.world.save()
 
 
+class PutStep(Step, frozen=True, kw_only=True):
+    """`put`: values of parts of a board, `{ eyes.distance_cm = 60 }`, all on one tick."""
+
+    VERB = "put"
+    NEEDS = "switch"
+    SUBJECTS = ("board",)
+
+    put: dict[str, Any]
+
+    def in_words(self) -> str:
+        return f"put {', '.join(f'{path} = {shown(value)}' for path, value in leaves(self.put))}"
+
+    def problem_alone(self, scenario: BoardScenario) -> str:
+        values = list(leaves(self.put))
+        if not values:
+            return "put: there is no value; write put = { eyes.distance_cm = 60 }"
+        for path, value in values:
+            try:
+                checked_put(scenario.parts, path, value)
+            except ValueError as error:
+                return f"put: {error}"
+        return ""
+
+    def do(self, player: Player) -> None:
+        player.put(list(leaves(self.put)))
+
+
+class PressStep(Step, frozen=True, kw_only=True):
+    """`press`: a button of a board is pressed, and let go `for_ms` (100) later; meanwhile the steps go on."""
+
+    VERB = "press"
+    NEEDS = "switch"
+    SUBJECTS = ("board",)
+
+    press: str
+    for_ms: PauseMs = 100.0
+
+    @property
+    def lasts_ms(self) -> float:
+        return 0.0
+
+    def problem_alone(self, scenario: BoardScenario) -> str:
+        try:
+            checked_put(scenario.parts, f"{self.press}.pressed", True)
+        except ValueError as error:
+            return f"press: {error}"
+        return ""
+
+    def do(self, player: Player) -> None:
+        player.press(self.press, self.for_ms)
+
+
+def leaves(table: Mapping[str, Any], above: str = "") -> Iterator[tuple[str, PutValue]]:
+    """The values of a table of tables, by their paths."""
+    for key, value in table.items():
+        path = f"{above}{key}"
+        if isinstance(value, Mapping):
+            yield from leaves(value, f"{path}.")
+        else:
+            yield path, value
+
+
 PLAIN: dict[str, type[Step]] = {
     struct.VERB: struct
-    for struct in (StreamStep, PauseStep, CheckStep, RadioStep, ResetStep, PowerStep, SaveStep)
+    for struct in (
+        *(StreamStep, PauseStep, CheckStep, RadioStep, ResetStep, PowerStep, SaveStep),
+        *(PutStep, PressStep),
+    )
 }
 """Steps whose table is read as it stands."""
 LOOKING: dict[str, type[ConditionStep]] = {

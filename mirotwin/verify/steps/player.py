@@ -20,16 +20,27 @@ from itertools import takewhile
 import msgspec
 
 from miro_exact.bad_input import BadInput
-from miro_exact.clock import CONTROL_PERIOD_TICKS, NEVER_TICK
+from miro_exact.clock import CONTROL_PERIOD_TICKS, NEVER_TICK, TICKS_PER_SECOND
 from miro_host.wheels import Wheels
+from miro_protocol.actions import Put, PutValue
 from miro_robot.image import Image
 from miro_sim.scenario.errors import ScenarioError
-from miro_sim.world.conditions import Answer, Condition, Reached, WheelSpeeds, When, answer_fields, speeds_of
+from miro_sim.world.conditions import (
+    Answer,
+    Condition,
+    Followed,
+    OfPin,
+    Reached,
+    WheelSpeeds,
+    When,
+    answer_fields,
+    speeds_of,
+)
 from miro_sim.world.events import Event
 from miro_sim.world.machine import Machine, why_not
 from miro_sim.world.waits import SEEN_AT_MOST, WaitExpired
 from miro_sim.world.world import World
-from mirotwin.verify.checks.interface import Check, at, ms_ticks
+from mirotwin.verify.checks.interface import Check, at, in_ms, ms_ticks
 from mirotwin.verify.checks.monitors import Checks
 from mirotwin.verify.frame_sender import FrameSender
 from mirotwin.verify.steps.keys import Step
@@ -88,7 +99,7 @@ class Host(FrameSender):
 class StepFailure(msgspec.Struct, frozen=True):
     """`step` failed at `tick`: what was wanted, what was found.
 
-    `begun_tick`: where the step began; `timed_out`: it waited for what did not come.
+    `begun_tick`: where the step began; `timed_out`: it waited for what did not come. `clock`: ticks per second.
     """
 
     step: str
@@ -98,9 +109,10 @@ class StepFailure(msgspec.Struct, frozen=True):
     wanted: str
     found: str
     timed_out: bool = False
+    clock: int = TICKS_PER_SECOND
 
     def __str__(self) -> str:
-        return f"{self.step}: {at(self.tick)}: wanted {self.wanted}, found {self.found}"
+        return f"{self.step}: {at(self.tick, self.clock)}: wanted {self.wanted}, found {self.found}"
 
 
 class _Failed(Exception):
@@ -128,12 +140,19 @@ class Player:
         self.failure: StepFailure | None = None
         self.saved: dict[str, bytes] = {}
         self.checks: list[Checks] = []
+        self.found = ""  # what pins, values and text were in the last wait
+        self.pressed: dict[str, int] = {}  # until which tick a button is
+        self._watch_pins()
 
     @property
     def world(self) -> World:
         """The machine of steps that need more than every machine has."""
         assert isinstance(self.machine, World)
         return self.machine
+
+    def ticks(self, time_ms: float) -> int:
+        """Milliseconds to ticks of the machine's clock."""
+        return ms_ticks(time_ms, self.machine.clock)
 
     def run(self) -> None:
         """The whole run: `play`, then `finish`."""
@@ -149,7 +168,8 @@ class Player:
                     raise _Failed(begun_tick, "to be done", self._end())
                 step.do(self)
             except _Failed as failed:
-                self.failure = StepFailure(f"{step}", step.number, begun_tick, *failed.args)
+                failure = StepFailure(f"{step}", step.number, begun_tick, *failed.args)
+                self.failure = msgspec.structs.replace(failure, clock=self.machine.clock)
                 return
             except ValueError as error:
                 if isinstance(error, ScenarioError):
@@ -169,7 +189,7 @@ class Player:
 
     def slot(self, slot: int | None, network: int) -> int:
         """The slot, or that of the network's first robot."""
-        return self.hosts[network].first_slot if slot is None else slot
+        return self.machine.lines[network].first_slot if slot is None else slot
 
     # Waiting
 
@@ -180,7 +200,7 @@ class Player:
         machine = self.machine
         if from_now:
             self._forget()
-        until_tick = NEVER_TICK if within_ms is None else machine.tick + ms_ticks(within_ms)
+        until_tick = NEVER_TICK if within_ms is None else machine.tick + self.ticks(within_ms)
         awaited = f"{wanted}" if within_ms is None else f"{wanted} within {within_ms:g} ms"
         earlier: list[Event] = []
         event = self._next(kind, until_tick, earlier)
@@ -192,6 +212,8 @@ class Player:
     def hold(self, condition: Condition, for_ms: float, never: bool) -> None:
         """Watches for `for_ms`: the wheels have to keep their speeds, or the condition must `never` become true."""
         machine, forbidden, required = self.machine, condition, f"no {condition}"
+        if isinstance(condition, Followed) and not never:
+            forbidden, required = condition.opposite(), f"{condition}"
         if isinstance(condition, WheelSpeeds) and not never:
             holds = condition.predicate
             forbidden = When(
@@ -199,7 +221,7 @@ class Player:
             )
             required = f"{condition}"
         self._forget()
-        until_tick = machine.tick + ms_ticks(for_ms)
+        until_tick = machine.tick + self.ticks(for_ms)
         event = self._next(forbidden, until_tick, [])
         if event is not None:
             raise _Failed(event.tick, f"{required} for {for_ms:g} ms", self._other(condition, event))
@@ -213,13 +235,14 @@ class Player:
 
     def _next(self, condition: Condition, until_tick: int, earlier: list[Event]) -> Event | None:
         """The next event for which `condition` is true, up to `until_tick`; `earlier` gets those before it."""
-        machine = self.machine
+        machine, self.found = self.machine, ""
         while True:
             stop_tick = min(until_tick, self._next_tick())
             within = None if stop_tick == NEVER_TICK else max(0, stop_tick - machine.tick)
             try:
                 return machine.run_until(condition, within=within)
             except WaitExpired as expired:
+                self.found = expired.found
                 earlier += expired.seen
                 del earlier[:-SEEN_AT_MOST]
             if machine.finished or machine.tick >= until_tick:
@@ -228,7 +251,7 @@ class Player:
 
     def pause(self, for_ms: float) -> None:
         """Lets time pass; the next wait also sees the events of this time."""
-        machine, until_tick = self.machine, self.machine.tick + ms_ticks(for_ms)
+        machine, until_tick = self.machine, self.machine.tick + self.ticks(for_ms)
         while machine.tick < until_tick and not machine.finished:
             longest_tick = machine.tick + CONTROL_PERIOD_TICKS
             machine.run_to(min(until_tick, longest_tick, self._next_tick()))
@@ -238,7 +261,7 @@ class Player:
             raise _Failed(machine.tick, "time to pass", self._end())
 
     def _next_tick(self) -> int:
-        return min(host.next_tick for host in self.hosts)
+        return min((host.next_tick for host in self.hosts), default=NEVER_TICK)
 
     def _top_up(self) -> None:
         for host in self.hosts:
@@ -248,10 +271,38 @@ class Player:
         """Checks from now on, of the robots in that network and slot; None: of all."""
         places = [
             (robot.network, robot.slot)
-            for robot in self.machine.robots
+            for robot in self.machine.devices
             if network in (None, robot.network) and slot in (None, robot.slot)
         ]
         self.checks.append(Checks(self.world, dict.fromkeys(places, checks)))
+
+    # Parts of a board
+
+    def put(self, values: Sequence[tuple[str, PutValue]]) -> None:
+        """Puts values of parts, as soon as possible and on one tick."""
+        machine, tick = self.machine, self.machine.earliest_action_tick
+        for path, value in values:
+            machine.do(Put(tick, 0, 0, path, value))
+
+    def press(self, button: str, for_ms: float) -> None:
+        """Presses a button, and lets it go later."""
+        machine = self.machine
+        tick = machine.earliest_action_tick
+        if tick <= self.pressed.get(button, -1):
+            until = in_ms(self.pressed[button], machine.clock)
+            raise ValueError(f"{button} is pressed until {until}; let it go before, by pause_ms")
+        self.pressed[button] = tick + self.ticks(for_ms)
+        machine.do(Put(tick, 0, 0, f"{button}.pressed", True))
+        machine.do(Put(self.pressed[button], 0, 0, f"{button}.pressed", False))
+
+    def _watch_pins(self) -> None:
+        """From now on the boards keep the edges of the pins that steps name: a wait knows how they stand."""
+        for step in self.steps:
+            condition = getattr(step, "condition", None)
+            if isinstance(condition, OfPin) and "board" in condition.SUBJECTS:
+                changes = self.machine.device(condition.network).changes if not self.hosts else None
+                if changes is not None:
+                    changes.find(condition.pin)
 
     # What was found
 
@@ -264,6 +315,8 @@ class Player:
         parts = [self._end()] if self.machine.finished else []
         if isinstance(wanted, WheelSpeeds):
             parts.append(self._speeds(wanted))
+        if self.found:
+            return "; ".join([*parts, self.found])
         parts.append(_meanwhile(earlier))
         return "; ".join(parts)
 
@@ -271,7 +324,9 @@ class Player:
         """The event that came instead."""
         if isinstance(wanted, WheelSpeeds):
             return self._speeds(wanted)
-        _, _, text = f"{event}".partition(": ")
+        text = f"{event}".split(": ", 1)[1]
+        if not self.hosts:  # of a board alone the place says nothing
+            text = text.partition(": ")[2]
         if isinstance(wanted, Answer):
             shown = [
                 f"{key} = {str(value).lower()}"

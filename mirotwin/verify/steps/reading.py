@@ -15,20 +15,27 @@ from typing import Any, NoReturn, TypeVar
 import msgspec
 
 from miro_exact.plugins import use_one_of
+from miro_sim.scenario.board import BoardScenario
 from miro_sim.scenario.board_scenario import AnyText
 from miro_sim.scenario.errors import ScenarioError, choices_of, remedy_for_key, value_error
 from miro_sim.scenario.keys import Scenario
-from miro_sim.world.conditions import CONDITIONS, Condition, WheelSpeeds
+from miro_sim.world.conditions import CONDITIONS, Condition, Followed, Kind, WheelSpeeds
 from mirotwin.verify.checks.expect import checks_of_table
 from mirotwin.verify.checks.interface import in_ms, ms_ticks
 from mirotwin.verify.steps.keys import LOOKING, PLAIN, SENDS, VERBS, CheckStep, SaveStep, SilenceStep, Step
 
 S = TypeVar("S", bound=msgspec.Struct)
+STATES: dict[str, type[Condition]] = {
+    name: kind
+    for name, kind in CONDITIONS.items()
+    if kind is WheelSpeeds or (issubclass(kind, Followed) and kind.LASTS)
+}
+"""The conditions that can be held."""
 _NO_KEYS = ("number", "checks", "verb", "condition")
 _TIMES = {"within_ms": "wait_for and expect", "from_now": "wait_for and expect", "for_ms": "never and hold"}
 
 
-def steps_of(scenario: Any, origin: str) -> list[Step]:
+def steps_of(scenario: Scenario | BoardScenario, origin: str) -> list[Step]:
     """The steps of a scenario, of which each can be done in its run. Raises ScenarioError with the place."""
     steps = [_Table(scenario, origin, index, table).step() for index, table in enumerate(scenario.step)]
     check_order(steps, scenario, origin)
@@ -43,22 +50,24 @@ def steps_in(text: AnyText) -> list[Step]:
         raise text.blamed(error) from error.__cause__
 
 
-def check_order(steps: Sequence[Step], scenario: Scenario, origin: str) -> None:
+def check_order(steps: Sequence[Step], scenario: Scenario | BoardScenario, origin: str) -> None:
     """Raises ScenarioError for what the steps together make impossible.
 
     That is the first step for which the run is too short, if all waits took no time at all, and a file that is saved
     twice.
     """
-    end, begins = scenario.end_tick, 0
+    end, begins, clock = scenario.end_tick, 0, scenario.clock
     saved: dict[str, int] = {}
     for step in steps:
         place = f"step {step.number}"
-        last = begins + max(step.lasts_ticks, ms_ticks(getattr(step, "within_ms", None) or 0.0))
+        lasts_ticks = ms_ticks(step.lasts_ms, clock)
+        last = begins + max(lasts_ticks, ms_ticks(getattr(step, "within_ms", None) or 0.0, clock))
         if begins >= end or last > end:
-            goes = f" and goes on to {in_ms(last)}" if last > begins else ""
-            reason = f"begins after {in_ms(begins)} or later{goes}, but the run ends after {in_ms(end)}"
+            goes = f" and goes on to {in_ms(last, clock)}" if last > begins else ""
+            begun, ends = in_ms(begins, clock), in_ms(end, clock)
+            reason = f"begins after {begun} or later{goes}, but the run ends after {ends}"
             raise ScenarioError(origin, place, reason, "give a longer duration_s, or shorter times")
-        begins += step.lasts_ticks
+        begins += lasts_ticks
         if isinstance(step, SaveStep):
             if step.save in saved:
                 reason = f"step {saved[step.save]} saves {step.save}, too"
@@ -69,7 +78,9 @@ def check_order(steps: Sequence[Step], scenario: Scenario, origin: str) -> None:
 class _Table:
     """One table to be read."""
 
-    def __init__(self, scenario: Scenario, origin: str, index: int, table: Mapping[str, Any]) -> None:
+    def __init__(
+        self, scenario: Scenario | BoardScenario, origin: str, index: int, table: Mapping[str, Any]
+    ) -> None:
         self.scenario = scenario
         self.origin = origin
         self.index = index
@@ -86,21 +97,52 @@ class _Table:
             self.refuse(
                 "", f"has both {verbs[0]} and {verbs[1]}", "one action or one wait a step: make two of it"
             )
-        step, networks = self._step(verbs[0]), self.scenario.networks
-        if step.network >= len(networks):
-            known = use_one_of(map(str, range(len(networks))))
-            self.refuse("network", f"there is no network {step.network}", known)
-        reason, _, remedy = step.problem(networks[step.network]).partition("; ")
+        step = self._step(verbs[0])
+        self.check_subject(step, verbs[0])
+        if isinstance(self.scenario, BoardScenario):
+            problem = self._place_alone() or step.problem_alone(self.scenario)
+        else:
+            problem = self._problem_of_robots(step, self.scenario)
+        reason, _, remedy = problem.partition("; ")
         if reason:
             key, _, rest = reason.partition(": ")
             self.refuse(key if rest else "", rest or reason, remedy)
         return step
 
+    def check_subject(self, step: Step, verb: str) -> None:
+        """Refuses what is for robots with a board alone, and the other way round."""
+        alone = isinstance(self.scenario, BoardScenario)
+        if ("board" if alone else "robot") not in step.subjects:
+            value = self.table[verb]
+            what = f"{verb} = {value!r}" if isinstance(value, str) and verb != "press" else verb
+            self.refuse(
+                verb, f"{what} is for {'robots' if alone else 'a board with parts'}", self.others(verb)
+            )
+
+    def others(self, verb: str) -> str:
+        """What could stand there instead."""
+        kind: Kind = "board" if isinstance(self.scenario, BoardScenario) else "robot"
+        choices: Mapping[str, Any] = SENDS if verb == "send" else CONDITIONS if verb in LOOKING else PLAIN
+        return use_one_of([name for name, struct in choices.items() if kind in struct.SUBJECTS])
+
+    def _place_alone(self) -> str:
+        for key in ("network", "slot"):
+            if key in self.table:
+                return f"{key}: a board is alone on its line; leave it out"
+        return ""
+
+    def _problem_of_robots(self, step: Step, scenario: Scenario) -> str:
+        networks = scenario.networks
+        if step.network >= len(networks):
+            known = use_one_of(map(str, range(len(networks))))
+            self.refuse("network", f"there is no network {step.network}", known)
+        return step.problem(networks[step.network])
+
     def _step(self, verb: str) -> Step:
         struct = PLAIN.get(verb) or LOOKING.get(verb) or self.choice(verb, SENDS)
         own = [key for key in struct.__struct_encode_fields__ if key not in _NO_KEYS]
         given: dict[str, Any] = {"number": self.index + 1}
-        kinds: dict[str, type[Condition]] = {"wheels": WheelSpeeds} if verb == "hold" else CONDITIONS
+        kinds = STATES if verb == "hold" else CONDITIONS
         kind, inner = None, list[str]()  # of the condition: its struct, its keys
         if struct is SilenceStep:
             inner = ["network"]
