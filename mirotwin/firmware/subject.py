@@ -12,8 +12,8 @@ from miro_exact.bad_input import BadInput
 from miro_exact.plugins import use_one_of
 from miro_robot.inspect.watcher import Watcher
 from miro_sim.radio.downlink import TransmissionError
-from miro_sim.scenario.board_file import ENDING, builtin_boards
-from miro_sim.scenario.file import builtin_names, load
+from miro_sim.scenario.board_scenario import is_board, load_any
+from miro_sim.scenario.file import builtin_names
 from miro_sim.world.world import World
 from mirotwin.firmware.bare_options import (
     BareOptions,
@@ -28,7 +28,7 @@ from mirotwin.runs.job import load_job
 from mirotwin.runs.result import fault_lines
 from mirotwin.runs.spec import RunSpec
 from mirotwin.shell.command import Argument, Options
-from mirotwin.shell.firmware_image import load_firmware
+from mirotwin.shell.firmware_image import image_for
 from mirotwin.shell.options import (
     FIRMWARE,
     FROM,
@@ -117,7 +117,7 @@ def open_run(options: SubjectOptions) -> InspectedRun:
     subject = options.subject
     if subject.lower().endswith(IMAGE_SUFFIXES):
         return _image_run(options, subject, options.bare)
-    if subject.endswith(ENDING) or subject in set(builtin_boards()) - set(builtin_names()):
+    if is_board(subject):
         if options.firmware is None:
             raise BadInput(
                 subject, "", "is a board, and no program for it is named", "give --firmware IMAGE.hex"
@@ -180,10 +180,10 @@ def _robot_run(options: SubjectOptions) -> InspectedRun:
     end_tick, job = None, None
     if subject in builtin_names() or subject.endswith(".toml") or not is_path:
         _refuse(options, "a scenario, of which nothing is judged here", "expected")
-        text = load(subject, options.settings)
+        text = load_any(subject, options.settings)
         tell_notes(text.notes)
         refuse_steps(text.scenario, subject)
-        image = load_firmware(options.firmware)
+        image = image_for(text, options.firmware)
         with plain_parameters(subject):
             world = RunSpec.of(text, image, options.seed or 0).world()
     else:

@@ -47,6 +47,8 @@ class ByteFifo:
 
 
 CHUNK_BYTES = 4096
+SETTLING_S = 0.2
+"""For so long a program that has opened a port may take to set its rate, before it is told that it is wrong."""
 Tell = Callable[[str], object]
 """Takes a line for the user."""
 
@@ -73,6 +75,8 @@ class Endpoint:
         self.clients = self.refused = 0
         self.bytes_in = self.bytes_out = self.dropped = 0
         self._client_bytes = (0, 0)
+        self._came_tick = 0
+        self._remarks: set[str] = set()
         self._watched = 0
 
     def receive(self) -> bytes:
@@ -87,16 +91,35 @@ class Endpoint:
         """Takes the port away."""
         raise NotImplementedError
 
+    @property
+    def baud(self) -> int:
+        """The rate that the client has set; 0: this kind of port has none."""
+        return 0
+
     def exchange(self, at_tick: int) -> None:
         """The client's bytes to the radio, at this tick or as soon as they can be."""
-        data = self.receive()
+        data, baud = self.receive(), self.baud
         if data:
             self.bytes_in += len(data)
-            self.port.send(data, at_tick)
+            if not self._is_said(self.port.deaf_to(baud)):
+                self.port.send(data, at_tick, baud)
+                self._is_said(self.port.remark_on_sending(baud))
+
+    def _is_said(self, remark: str) -> bool:
+        """Whether there is a remark, which is told once a client."""
+        if remark and remark not in self._remarks:
+            self._remarks.add(remark)
+            self.tell(f"{self.name}: {self.client or 'the client'} {remark}")
+        return bool(remark)
 
     def deliver(self, data: bytes) -> None:
         """Passes what the PC has received to the client, if one is there."""
-        if self.client:
+        if self.client and data:
+            since = self.port.world.tick - self._came_tick
+            if (mute := self.port.mute_at(self.baud)) and since < self.port.world.clock * SETTLING_S:
+                return  # it has not set its rate yet
+            if self._is_said(mute):
+                return
             full = self.out.dropped
             self.out.add(data)
             if self.out.dropped and not full:
@@ -126,6 +149,8 @@ class Endpoint:
     def has_come(self, client: str) -> None:
         self.client = client
         self.clients += 1
+        self._came_tick = self.port.world.tick
+        self._remarks.clear()
         self._client_bytes = self.bytes_in, self.bytes_out
         self.tell(f"{self.name}: {client} is there")
 

@@ -9,9 +9,9 @@ recording knows which had one. Slicer noise reaches robots only: the PC's receiv
 
 from __future__ import annotations
 
-from miro_exact.clock import HOST_CHARACTER_TICKS
 from miro_sim.world.actions import SETTLE_TICKS
 from miro_sim.world.events import Cursor
+from miro_sim.world.medium import Medium
 from miro_sim.world.outbox import INJECTED
 from miro_sim.world.world import World
 
@@ -22,29 +22,49 @@ TRANSMIT_CHARACTERS = 4096
 class RadioPort:
     """The port of `network`. Raises ValueError for a network that is not there."""
 
+    baud = 9600
+    """Of a terminal that nobody has set otherwise."""
+
     def __init__(self, world: World, network: int = 0) -> None:
         world.earliest_tick(network)  # refuses a network that is not there
         self.world = world
         self.network = network
-        self._parts = world.networks[network]
-        self._cursor = Cursor(self._parts.log)
+        self._line: Medium = world.lines[network]
+        self._cursor = Cursor(self._line.log)
 
     @property
     def free_tick(self) -> int:
         """When everything that was given to the port has been sent; the past, if it has."""
-        return self._parts.outbox.end_tick(self._parts.downlink.free_tick)
+        return self._line.outbox.end_tick(self._line.free_tick())
 
     @property
     def waiting(self) -> int:
         """Characters that are not sent yet; the one under way counts."""
-        return max(0, -(-(self.free_tick - self.world.tick) // HOST_CHARACTER_TICKS))
+        ticks = self.free_tick - self.world.tick
+        return max(0, -(-ticks // self._line.outbox.character_ticks)) if ticks > 0 else 0
 
     @property
     def room(self) -> int:
         """Characters that the transmit buffer takes now."""
         return max(0, TRANSMIT_CHARACTERS - self.waiting)
 
-    def send(self, data: bytes, at_tick: int = 0) -> int:
+    def takes(self, baud: int) -> bool:
+        """Whether a client can set this rate."""
+        return baud == self.baud
+
+    def remark_on_sending(self, baud: int) -> str:
+        """What is wrong with a client's rate (0: it has none) for what it sends, and no reason to drop it."""
+        return f"has set another baud rate; the radio has {self.baud}" if baud not in (0, self.baud) else ""
+
+    def deaf_to(self, baud: int) -> str:
+        """Why nothing that a client sends at this rate is passed on; "" where it is."""
+        return ""
+
+    def mute_at(self, baud: int) -> str:
+        """Why nothing is passed on to a client that receives at this rate; "" where it is."""
+        return ""
+
+    def send(self, data: bytes, at_tick: int = 0, baud: int = 0) -> int:
         """Puts at least one character into the transmit buffer; returns the tick of the first start bit.
 
         The carrier comes up at the next tick that is settled on no wire: 120 ticks from now, or from `at_tick`.
@@ -52,13 +72,13 @@ class RadioPort:
         before the start of the control period would, replayed, belong to the period before, and the digests would
         differ.
         """
-        outbox = self._parts.outbox
+        outbox = self._line.outbox
         earliest = max(self.world.tick, at_tick) + SETTLE_TICKS + outbox.lead_ticks
         return self.world.inject(data, self.network, max(earliest, self.free_tick))
 
     def purge(self) -> None:
         """Takes back what has not begun to be sent."""
-        outbox = self._parts.outbox
+        outbox = self._line.outbox
         outbox.waiting = [one for one in outbox.waiting if one.origin != INJECTED]
 
     def received(self) -> bytes:

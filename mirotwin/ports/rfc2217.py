@@ -1,8 +1,9 @@
-"""A radio's port behind RFC 2217: TCP with telnet negotiation of baud rate, format and lines, as `rfc2217://` speaks.
+"""A port behind RFC 2217: TCP with telnet negotiation of baud rate, format and lines, as `rfc2217://` speaks.
 
-Rate and format: 9600 8N1 and nothing else; another one is answered with what there is, and the client raises. Flow
-control, DTR, RTS and BREAK are acknowledged and have no effect: the radio module has no such wires, and no break gets
-through it. CTS, DSR and CD are active. Negotiation that makes no sense is ignored and counted.
+Format: 8N1 and nothing else, and of a radio 9600 baud; another one is answered with what there is, and the client
+raises. A wire takes any rate until it has one. Flow control, DTR, RTS and BREAK are acknowledged and have no effect: a
+radio module and a wire of three have no such lines, and no break gets through. CTS, DSR and CD are active. Negotiation
+that makes no sense is ignored and counted.
 """
 
 from __future__ import annotations
@@ -15,7 +16,6 @@ from serial.serialutil import EIGHTBITS, PARITY_NONE, STOPBITS_ONE
 
 from mirotwin.ports.sockets import TcpEndpoint
 
-BAUD = 9600
 LONGEST_SUBOPTION = 256
 NONSENSE = (struct.error, TypeError, ValueError, KeyError, IndexError)
 """What `PortManager` raises for a command that is cut short or has values that do not exist."""
@@ -30,7 +30,12 @@ class Rfc2217Endpoint(TcpEndpoint):
 
     def greet(self) -> None:
         self._reported = False
-        self._manager = rfc2217.PortManager(_FixedSettings(self), self)
+        self._settings = _Settings(self)
+        self._manager = rfc2217.PortManager(self._settings, self)
+
+    @property
+    def baud(self) -> int:
+        return 0 if self._manager is None else self._settings.baudrate
 
     def from_client(self, data: bytes) -> bytes:
         manager = self._manager
@@ -57,20 +62,24 @@ class Rfc2217Endpoint(TcpEndpoint):
         return b"".join(self._manager.escape(data))
 
 
-class _FixedSettings:
-    """The port as `PortManager` sees it: settings that can be read, of which none can be changed."""
+class _Settings:
+    """The port as `PortManager` sees it: settings that can be read, of which only the rate of a wire can be changed."""
 
     cts = dsr = cd = True
     ri = False
     xonxoff = rtscts = dtr = rts = break_condition = False
-    baudrate, bytesize, parity, stopbits = BAUD, EIGHTBITS, PARITY_NONE, STOPBITS_ONE
+    bytesize, parity, stopbits = EIGHTBITS, PARITY_NONE, STOPBITS_ONE
+    baudrate = 0
 
     def __init__(self, endpoint: Rfc2217Endpoint) -> None:
         self._endpoint = endpoint
+        super().__setattr__("baudrate", endpoint.port.baud)
 
     def __setattr__(self, name: str, wanted: object) -> None:
-        if name in ("baudrate", "bytesize", "parity", "stopbits") and wanted != getattr(self, name):
-            raise ValueError(f"this radio's port has {getattr(self, name)}")
+        if name == "baudrate" and isinstance(wanted, int) and self._endpoint.port.takes(wanted):
+            super().__setattr__(name, wanted)
+        elif name in ("baudrate", "bytesize", "parity", "stopbits") and wanted != getattr(self, name):
+            raise ValueError(f"this port has {getattr(self, name)}")
         super().__setattr__(name, wanted)
 
     def reset_input_buffer(self) -> None:

@@ -9,8 +9,9 @@ from typing import Annotated
 
 from msgspec.structs import replace
 
-from miro_exact.clock import ticks
-from miro_sim.scenario.file import LONGEST_S, for_session, lasting
+from miro_sim.scenario.board_scenario import AnyText, BoardText, is_board, load_any
+from miro_sim.scenario.file import LONGEST_S, builtin_names, for_session, lasting
+from mirotwin.ports.put_lines import lines_of_stdin
 from mirotwin.ports.serve_ports import PortOptions, open_ports
 from mirotwin.ports.session import FASTEST, Pace, Session
 from mirotwin.recording.recorder import source_of
@@ -19,7 +20,7 @@ from mirotwin.run.run_files import RunFiles
 from mirotwin.runs.run import Run
 from mirotwin.runs.spec import RunSpec
 from mirotwin.shell.command import Option, Options, command_of
-from mirotwin.shell.firmware_image import load_firmware
+from mirotwin.shell.firmware_image import image_for
 from mirotwin.shell.held_signals import held_signals
 from mirotwin.shell.options import (
     OUT,
@@ -31,8 +32,10 @@ from mirotwin.shell.options import (
     Seed,
     Settings,
     plain_parameters,
+    refuse_steps,
 )
 from mirotwin.shell.outputs import FILES, KEPT, RECORDING, OutputFolder
+from mirotwin.shell.part_files import Parts, bring_parts
 from mirotwin.shell.program import complain, show_line, tell_notes
 from mirotwin.shell.progress import ProgressBar
 from mirotwin.shell.times import Time, TimeType
@@ -66,16 +69,20 @@ class ServeOptions(Options, frozen=True, kw_only=True):
     settings: Settings = ()
     expected: Expected = ()
     firmware: Firmware = None
+    parts: Parts = ()
     engine: Engine = None
     quiet: Annotated[bool, QUIET.saying("Do not tell who comes and goes, and how late the world is.")] = False
 
 
 @command_of(ServeOptions)
 def serve(options: ServeOptions) -> int:
-    """Runs SCENARIO by the wall clock; programs are its PC. Each port is the serial port of the PC's radio.
+    """Runs SCENARIO by the wall clock; programs are its PC. Each port is the serial port of the PC's radio, or of a PC
+    that is wired to a board: SCENARIO may be that of a board, or a board file with --firmware.
 
     A line on stdout names each port, and `serving` follows. All ports may be used at once, each by one client: all hear
     the robots, all may send. A port of another network than the first is asked for as PORT@NETWORK or LINK@NETWORK.
+
+    Lines on stdin act on a board's parts: `eyes.distance_cm = 30` puts a value, `lcd.text` shows one, `?` all of them.
 
     run.mcap and summary.json are those of `run`; `mirotwin replay run.mcap` sends the same bytes at the same ticks.
     Ctrl-C and SIGTERM leave run.part.mcap and summary.part.json, which hold all control periods up to then, and
@@ -83,15 +90,16 @@ def serve(options: ServeOptions) -> int:
 
     Exit code 1: a check failed; 3: the firmware did what it must not.
     """
-    seed, settings = options.seed, (*options.settings, *as_settings(options.expected))
-    own = for_session(options.scenario, settings)
-    expected, text = expectations_in(own), lasting(own)
+    seed = options.seed
+    bring_parts(options.parts)
+    own, text = _texts(options)
+    expected = expectations_in(own)
     tell_notes(text.notes)
     default = Path("runs") / f"{text.scenario.name}-{seed}-live"
     folder = OutputFolder(
         options.out or default, options.ports.force, (*FILES, CASE), ours=options.out is None
     )
-    image = load_firmware(options.firmware)
+    image = image_for(own, options.firmware)
     with plain_parameters(text.origin):
         run = Run.traced(replace(RunSpec.of(text, image, seed), expected=expected))
     world = run.world
@@ -112,8 +120,11 @@ def serve(options: ServeOptions) -> int:
         for port in ports:
             show_line(f"{port.kind} {port.where}")
         show_line("serving")
-        end_tick = ticks(LONGEST_S) if options.duration is None else options.duration.ticks()
-        session = Session(world, Pace(options.pace), selector, ports, tell, end_tick, options.once)
+        duration = options.duration
+        end_tick = int(LONGEST_S * world.clock) if duration is None else duration.ticks(world.clock)
+        puts = lines_of_stdin(world, selector, show_line, complain)
+        pace = Pace(options.pace, world.clock)
+        session = Session(world, pace, selector, ports, tell, end_tick, options.once, puts)
         run_files.move, run_files.live = session.run, session.live
         try:
             summary = run_files.fill(ProgressBar("serving", None, quiet=True), hold, None)
@@ -133,6 +144,20 @@ def serve(options: ServeOptions) -> int:
     result = run.result()
     complain(*result.texts)
     return result.code
+
+
+def _texts(options: ServeOptions) -> tuple[AnyText, AnyText]:
+    """The scenario, whose checks are right for its own duration, and the same as it lasts for a session."""
+    source, settings = options.scenario, (*options.settings, *as_settings(options.expected))
+    if source in builtin_names():
+        own = for_session(source, settings)
+        return own, lasting(own)
+    day = f"duration_s={LONGEST_S!r}"
+    read = load_any(source, (*settings, day) if is_board(source) else settings)
+    if not isinstance(read, BoardText):
+        return read, lasting(read)
+    refuse_steps(read.scenario, read.origin)
+    return read, load_any(source, (*settings, day))
 
 
 def _leave_case(folder: OutputFolder, run: Run) -> None:

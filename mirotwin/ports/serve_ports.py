@@ -10,6 +10,7 @@ from typing import Annotated
 
 from miro_exact.bad_input import BadInput, shortened
 from miro_exact.plugins import use_one_of
+from miro_sim.world.wire import Wire
 from miro_sim.world.world import World
 from mirotwin.ports import endpoint
 from mirotwin.ports.endpoint import Endpoint, Tell
@@ -17,6 +18,7 @@ from mirotwin.ports.radio_port import RadioPort
 from mirotwin.ports.rfc2217 import Rfc2217Endpoint
 from mirotwin.ports.sockets import TcpEndpoint
 from mirotwin.ports.terminal import PtyEndpoint
+from mirotwin.ports.wire_port import WirePort
 from mirotwin.shell.command import Option, Options, Word
 from mirotwin.shell.options import FORCE
 
@@ -100,7 +102,10 @@ def open_ports(
     options: PortOptions, world: World, selector: BaseSelector, tell: Tell
 ) -> Iterator[list[Endpoint]]:
     """All of them, or none. Raises BadInput for one that cannot be had."""
-    radios = [RadioPort(world, network) for network in range(len(world.networks))]
+    radios = [
+        WirePort(world, line.index) if isinstance(line, Wire) else RadioPort(world, line.index)
+        for line in world.lines
+    ]
 
     def context(option: str, network: int) -> endpoint.PortContext:
         if network >= len(radios):

@@ -1,9 +1,10 @@
-"""A live session: a world that the wall clock drives, and the ports through which programs talk to its robots.
+"""A live session: a world that the wall clock drives, and the ports through which programs talk to robots or a board.
 
-The world goes on in slices of half a millisecond, and programs get what robots have said at the end of each. A
-program's bytes go on the air at the very moment at which they arrive, or, in a world that is behind, where its control
-period ends at the latest. Such a world catches up as fast as it can, and says so: it never skips. The tick at which
-bytes went on the air is what the recording keeps; how they came to arrive then is not needed to run it again.
+The world goes on in slices of half a millisecond, and programs get what was sent to them at the end of each. A
+program's bytes go on the air, or on the wire, at the very moment at which they arrive, or, in a world that is behind,
+where its control period ends at the latest. Such a world catches up as fast as it can, and says so: it never skips.
+The tick at which bytes went on the air is what the recording keeps; how they came to arrive then is not needed to run
+it again.
 """
 
 from __future__ import annotations
@@ -12,28 +13,30 @@ import time
 from collections.abc import Sequence
 from selectors import BaseSelector
 
-from miro_exact.clock import CONTROL_PERIOD_TICKS, TICKS_PER_SECOND, seconds, ticks
+from miro_exact.clock import TICKS_PER_SECOND
 from miro_sim.world.world import World
 from mirotwin.ports.endpoint import Endpoint, Tell
+from mirotwin.ports.put_lines import PutLines
 from mirotwin.runs.summary import LiveFigures
 
 FASTEST = 1000.0
 """Virtual seconds in one, at most."""
-LATE_TICKS = ticks(0.020)
+LATE_S = 0.020
 """What counts as late: a little more than the 16 ms for which an adapter of USB may keep a character."""
 SLICE_S = 0.0005
 """By up to so much answers come late. A comparison at a port allows positions what that lateness explains."""
-LONGEST_SLICE_TICKS = ticks(0.020)
+LONGEST_SLICE_S = 0.020
 
 
 class Pace:
-    """Wall time as ticks from when it was made (or `start`ed): `factor` virtual seconds in one.
+    """Wall time as ticks from when it was made (or `start`ed): `factor` virtual seconds in one, of `clock` ticks each.
 
     `late_ticks`: the most that a world was behind; `late_s`: virtual time in which it was behind by 20 ms or more.
     """
 
-    def __init__(self, factor: float = 1.0) -> None:
+    def __init__(self, factor: float = 1.0, clock: int = TICKS_PER_SECOND) -> None:
         self.factor = factor
+        self.clock = clock
         self.late_ticks = 0
         self.late_s = 0.0
         self._reported_ticks = 0
@@ -47,7 +50,7 @@ class Pace:
     def tick(self) -> int:
         """Where virtual time should be now."""
         since_s = time.monotonic() - self._began_s
-        return self._began_tick + int(since_s * self.factor * TICKS_PER_SECOND)
+        return self._began_tick + int(since_s * self.factor * self.clock)
 
     def note(self, from_tick: int, to_tick: int, due_tick: int) -> str:
         """Counts that a world went on from one tick to the other when it should have been at `due_tick`.
@@ -56,17 +59,17 @@ class Pace:
         """
         behind = due_tick - to_tick
         self.late_ticks = max(self.late_ticks, behind)
-        if behind < LATE_TICKS:
+        if behind < LATE_S * self.clock:
             return ""
-        self.late_s += seconds(to_tick - from_tick)
+        self.late_s += (to_tick - from_tick) / self.clock
         if behind < 2 * self._reported_ticks:
             return ""
         self._reported_ticks = behind
-        return f"{1000.0 * seconds(behind):.0f} ms behind the wall clock"
+        return f"{1000.0 * behind / self.clock:.0f} ms behind the wall clock"
 
     def wait_s(self, tick: int) -> float:
         """Wall time until virtual time should be at `tick`; 0 where it should be there already."""
-        return max(0, tick - self.tick()) / (self.factor * TICKS_PER_SECOND)
+        return max(0, tick - self.tick()) / (self.factor * self.clock)
 
     def sleep_until(self, tick: int) -> None:
         """Sleeps until virtual time should be at `tick`."""
@@ -74,7 +77,10 @@ class Pace:
 
 
 class Session:
-    """Runs `world` until it is over, or `end_tick`; with `once` until all clients have gone."""
+    """Runs `world` until it is over, or `end_tick`; with `once` until all clients have gone.
+
+    `puts`: lines that act on parts of a board.
+    """
 
     def __init__(
         self,
@@ -85,6 +91,7 @@ class Session:
         tell: Tell,
         end_tick: int,
         once: bool = False,
+        puts: PutLines | None = None,
     ) -> None:
         self.world = world
         self.pace = pace
@@ -92,8 +99,9 @@ class Session:
         self.endpoints = endpoints
         self.tell = tell
         self.once = once
-        self.periods = min(world.periods, -(-end_tick // CONTROL_PERIOD_TICKS))
-        self._slice_ticks = max(1, min(ticks(SLICE_S * pace.factor), LONGEST_SLICE_TICKS))
+        self.puts = puts
+        self.periods = min(world.periods, -(-end_tick // world.period_ticks))
+        self._slice_ticks = max(1, int(min(SLICE_S * pace.factor, LONGEST_SLICE_S) * world.clock))
 
     @property
     def finished(self) -> bool:
@@ -114,17 +122,19 @@ class Session:
             self.selector.select(self.pace.wait_s(next_tick))
             due = self.pace.tick()
             self._advance(min(due, tick, next_tick), due)
+            if self.puts is not None:
+                self.puts.exchange(min(due, tick))
             for endpoint in self.endpoints:
                 endpoint.exchange(min(due, tick))
                 endpoint.push()
 
     def _advance(self, tick: int, due_tick: int) -> None:
-        before = self.world.tick
+        world, before = self.world, self.world.tick
         if tick <= before:
             return
-        self.world.run_to(tick)
+        world.run_to(tick)
         if behind := self.pace.note(before, tick, due_tick):
-            self.tell(f"{seconds(tick):.3f} s: {behind}")
+            self.tell(f"{tick / world.clock:.3f} s: {behind}")
         received: dict[int, bytes] = {}
         for endpoint in self.endpoints:
             port = endpoint.port
@@ -141,7 +151,7 @@ class Session:
         """What the summary says of the session."""
         return LiveFigures(
             realtime=self.pace.factor,
-            late_max_ms=1000.0 * seconds(self.pace.late_ticks),
+            late_max_ms=1000.0 * self.pace.late_ticks / self.pace.clock,
             late_s=self.pace.late_s,
             plugs=tuple(endpoint.plug() for endpoint in self.endpoints),
         )

@@ -1,4 +1,4 @@
-"""A radio's port behind TCP: the bytes as they are.
+"""A port behind TCP: the bytes as they are.
 
 A second client is refused: its connection is closed at once and the user is notified. A client that has shut down its
 sending side (`socat - TCP:..` at the end of its input) is there for half a second more, in which it gets answers,
@@ -12,10 +12,9 @@ import socket
 from selectors import EVENT_READ
 
 from miro_exact.bad_input import BadInput
-from miro_exact.clock import ticks
 from mirotwin.ports.endpoint import CHUNK_BYTES, Endpoint, PortContext
 
-LINGER_TICKS = ticks(0.5)
+LINGER_S = 0.5
 MOST_WIRE_BYTES = 65_536
 """What may wait in a connection's own words; a client that makes more of them without reading is put out."""
 
@@ -47,7 +46,8 @@ class TcpEndpoint(Endpoint):
         if self._socket is None:
             return b""
         if over_tick >= 0:
-            if self.port.world.tick >= max(over_tick, self.port.free_tick) + LINGER_TICKS:
+            linger_ticks = int(LINGER_S * self.port.world.clock)
+            if self.port.world.tick >= max(over_tick, self.port.free_tick) + linger_ticks:
                 self._put_out()
             return b""
         data = self._read(min(CHUNK_BYTES, self.port.room))

@@ -1,9 +1,9 @@
-"""A radio's port as a pseudo-terminal, which programs open as they open /dev/ttyUSB0.
+"""A port as a pseudo-terminal, which programs open as they open /dev/ttyUSB0.
 
 The kernel tells whether anybody has it open, not how many: two programs that open it share what comes, as they would a
-real port. It is raw, without echo, at 9600 baud, and made so again whenever it was closed; a terminal takes any baud
-rate, and one that is not the radio's is reported once, because no rate has an effect here. What a program has not read
-when it closes is gone.
+real port. It is raw, without echo, at 9600 baud or at the rate of the board's file, and made so again whenever it was
+closed; a terminal takes any baud rate, and one that is not that of the line is reported once. What a program has not
+read when it closes is gone.
 """
 
 from __future__ import annotations
@@ -18,6 +18,25 @@ from miro_exact.bad_input import BadInput
 from mirotwin.ports.endpoint import CHUNK_BYTES, Endpoint, PortContext
 
 SOMEBODY = "a program"
+RATES = (
+    300,
+    600,
+    1200,
+    1800,
+    2400,
+    4800,
+    9600,
+    19200,
+    38400,
+    57600,
+    115200,
+    230400,
+    460800,
+    500000,
+    576000,
+    921600,
+)
+"""Those that a terminal may have."""
 
 
 class PtyEndpoint(Endpoint):
@@ -38,6 +57,8 @@ class PtyEndpoint(Endpoint):
             raise BadInput("--pty", "", "there are no pseudo-terminals on this system", "use --tcp") from None
         self._termios: Any = termios
         self._tty: Any = tty
+        self._rates = {getattr(termios, f"B{baud}"): baud for baud in RATES if hasattr(termios, f"B{baud}")}
+        self._default_rate = getattr(termios, f"B{context.port.baud}", 0)
         self._master, slave = os.openpty()
         self.path = os.ttyname(slave)
         os.set_blocking(self._master, False)
@@ -50,12 +71,19 @@ class PtyEndpoint(Endpoint):
         super().__init__(context, self.path if link is None else f"{link}")
         self._poll = select.poll()
         self._poll.register(self._master, select.POLLIN)
-        self._reported = False
+
+    @property
+    def baud(self) -> int:
+        """What the program has set; 0 while nobody has, where a terminal does not have the rate of the line."""
+        rate = self._termios.tcgetattr(self._master)[5]
+        if not self._default_rate and rate == self._termios.B9600:
+            return 0
+        return self._rates.get(rate, 0)
 
     def _make_raw(self) -> None:
         self._tty.setraw(self._master)
         modes = self._termios.tcgetattr(self._master)
-        modes[4] = modes[5] = self._termios.B9600
+        modes[4] = modes[5] = self._default_rate or self._termios.B9600
         self._termios.tcsetattr(self._master, self._termios.TCSANOW, modes)
 
     def _make_link(self, link: Path, force: bool) -> None:
@@ -89,19 +117,11 @@ class PtyEndpoint(Endpoint):
         is_open = not events & select.POLLHUP
         was_there = bool(self.client)
         if not was_there and (data or is_open):
-            self._reported = False
             self.has_come(SOMEBODY)
-        if data and not self._reported:
-            self._tell_speed()
         if was_there and not is_open and not events & select.POLLIN:
             self._hang_up()
         self._watch()
         return data
-
-    def _tell_speed(self) -> None:
-        self._reported = True
-        if self._termios.tcgetattr(self._master)[5] != self._termios.B9600:
-            self.tell(f"{self.name}: {SOMEBODY} has set another baud rate; the radio has 9600")
 
     def _hang_up(self) -> None:
         self._watch(leave=True)

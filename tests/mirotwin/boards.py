@@ -14,6 +14,7 @@ MOV SCON,#50h
 MOV TMOD,#20h
 MOV TH1,#0FDh
 SETB TR1
+SETB TI
 again:
 JB INT0,up
 CLR P1.0
@@ -25,6 +26,8 @@ INC 30h
 JNB RI,again
 CLR RI
 MOV A,SBUF
+JNB TI,$
+CLR TI
 MOV SBUF,A
 SJMP again
 """

@@ -64,7 +64,7 @@ def test_until_stops_before_the_first_instruction_at_which_it_is_true_and_going_
 
 
 def test_a_breakpoint_may_ask_for_parts(console):
-    console.do("break 0x0b if lamp.on && key.pressed")
+    console.do("break 0x0d if lamp.on && key.pressed")
     assert "breakpoint 1" in said(console, "continue")
     assert console.timeline.tick > PRESSED_TICK
 
