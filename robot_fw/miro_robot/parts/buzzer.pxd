@@ -9,6 +9,7 @@ cdef class BuzzerPart(Part):
     cdef public int flows, has_flowed
     cdef public long long flowed_tick, period_ticks, sounded_ticks
 
-    @cython.locals(period_ticks='long long')
-    cdef _pulse(self, long long tick)
-    cdef long long _tone_ticks(self, long long tick) noexcept
+    @cython.locals(flows=int, period_ticks='long long')
+    cpdef changed(self, unsigned int pins, long long tick)
+    @cython.locals(since='long long')
+    cpdef long long _since(self, long long tick) noexcept

@@ -37,7 +37,7 @@ class Buzzer(PartKeys, frozen=True, kw_only=True, tag="buzzer"):
 
 
 class BuzzerPart(Part):
-    """`flows`: current. `flowed_tick`: since when, or when last. `period_ticks`: of a tone; `sounded_ticks`: before."""
+    """`flows`: current, since `flowed_tick` or last then. `period_ticks`: of a tone. `sounded_ticks`: before it."""
 
     STATE = {
         "flows": FLAG,
@@ -55,43 +55,38 @@ class BuzzerPart(Part):
         self.longest_ticks = self.crystal_hz // _SLOWEST_HZ
         self.flows = self.has_flowed = self.flowed_tick = self.period_ticks = self.sounded_ticks = 0
 
-    def start(self, tick: int) -> None:
-        self.flows = self.has_flowed = self.flowed_tick = self.period_ticks = self.sounded_ticks = 0
-        self.changed(1, tick)
+    def supply(self, on: int, tick: int) -> None:
+        self.sounded_ticks += self._since(tick)
+        self.flows = self.has_flowed = self.period_ticks = 0
+        if on:
+            self.changed(1, tick)
 
     def changed(self, pins: int, tick: int) -> None:
         flows = 1 if self.level(0) == self.flow_level else 0
         if flows == self.flows:
             return
+        if flows or not self.is_passive:
+            self.sounded_ticks += self._since(tick)
         self.flows = flows
-        if self.is_passive:
-            if flows:
-                self._pulse(tick)
-        elif flows:
+        if flows:
+            period_ticks = tick - self.flowed_tick if self.has_flowed else 0
+            self.period_ticks = period_ticks if period_ticks <= self.longest_ticks else 0
+            self.has_flowed = 1
             self.flowed_tick = tick
-        else:
-            self.sounded_ticks += tick - self.flowed_tick
 
-    def _pulse(self, tick: int) -> None:
-        """A passive one gets the next pulse."""
-        self.sounded_ticks += self._tone_ticks(tick)
-        period_ticks = tick - self.flowed_tick
-        self.period_ticks = period_ticks if self.has_flowed and period_ticks <= self.longest_ticks else 0
-        self.has_flowed = 1
-        self.flowed_tick = tick
-
-    def _tone_ticks(self, tick: int) -> int:
-        """For how long a tone has sounded since the last pulse."""
-        return min(tick - self.flowed_tick, 2 * self.period_ticks)
+    def _since(self, tick: int) -> int:
+        """For how long it has sounded since the beginning of the last pulse."""
+        since = tick - self.flowed_tick
+        if self.is_passive:
+            return min(since, 2 * self.period_ticks)
+        return since if self.flows else 0
 
     def read(self, name: str, tick: int) -> float | int | bool | str:
         sounds = self.flows != 0
-        since = tick - self.flowed_tick if sounds else 0
         if self.is_passive:
-            since = self._tone_ticks(tick)
             sounds = tick - self.flowed_tick < 2 * self.period_ticks
         if name == "on":
             return sounds
         if name == "frequency_hz":
             return self.crystal_hz / self.period_ticks if self.is_passive and sounds else 0.0
-        return 1000.0 * (self.sounded_ticks + since) / self.crystal_hz
+        return 1000.0 * (self.sounded_ticks + self._since(tick)) / self.crystal_hz

@@ -42,8 +42,8 @@ class LedPart(Part):
         self.on = 0
         self.flashes = 0
 
-    def start(self, tick: int) -> None:
-        self.on = 1 if self.level(0) == self.lit else 0
+    def supply(self, on: int, tick: int) -> None:
+        self.on = 1 if on and self.level(0) == self.lit else 0
 
     def changed(self, pins: int, tick: int) -> None:
         self.on = 1 if self.level(0) == self.lit else 0

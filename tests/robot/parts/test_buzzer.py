@@ -50,3 +50,22 @@ def test_a_level_and_clicks_are_no_tone():
         board.drive("net", 1, (101 + 60 * click) * MS)
         assert not board.read("horn.on")
     assert board.read("horn.sounded_ms") == 0
+
+
+@pytest.mark.parametrize("kind", ["active", "passive"])
+def test_without_supply_it_is_silent_and_keeps_how_long_it_has_sounded(kind):
+    board = bench(kind=kind)
+    for pulse in range(5):
+        board.drive("net", 0, (10 + 2 * pulse) * MS)
+        board.drive("net", 1, (11 + 2 * pulse) * MS)
+    board.drive("net", 0, 20 * MS)
+    board.run(21 * MS)
+    before = board.read("horn.sounded_ms")
+    assert board.read("horn.on")
+    board.power(0)
+    board.run(100 * MS)
+    assert (board.read("horn.on"), board.read("horn.sounded_ms")) == (False, before)
+    board.power(1)
+    board.drive("net", 0)
+    assert board.read("horn.on") == (kind == "active")
+    assert board.read("horn.sounded_ms") == before
