@@ -30,10 +30,9 @@ from miro_robot.parts.part import Part
 _RS, _SELECT, _RW, _E, _DATA = 0b1, 0b11, 0b10, 0b100, 0xFF << 3
 _D0, _D7 = 3, 10
 _NEVER = NEVER_TICK
-_FOSC_KHZ = 270.0
-_SHORT_US, _LONG_US, _COUNT_US = 37.0, 1520.0, 1500.0 / 270.0
-"""An instruction; clear and home (table 6); the address counter after the busy flag (figure 10)."""
-_WIDTH_NS, _CYCLE_NS, _SELECT_NS, _DATA_NS = 230, 500, 40, 80
+_TIMES_US = 37.0, 1520.0, 1500.0 / 270.0
+"""At 270 kHz: an instruction; clear and home (table 6); the address counter after the busy flag (figure 10)."""
+_BUS_NS = 230, 500, 40, 80
 """PW_EH, t_cycE, t_AS, t_DSW: bus timing at 4.5 to 5.5 V."""
 _ROM = (
     2 * "⓪①②③④⑤⑥⑦"
@@ -131,13 +130,10 @@ class Lcd1602Part(Part):
         Part.__init__(self, keys, place)
         self.rows, self.columns = keys.rows, keys.columns
         self.reset_ticks = self.ticks(1000.0 * keys.reset_ms)
-        self.short_ticks = self.ticks(_SHORT_US * _FOSC_KHZ / keys.clock_khz)
-        self.long_ticks = self.ticks(_LONG_US * _FOSC_KHZ / keys.clock_khz)
-        self.count_ticks = self.ticks(_COUNT_US * _FOSC_KHZ / keys.clock_khz)
-        self.width_ticks = -(-_WIDTH_NS * self.crystal_hz // 1_000_000_000)  # rounded up
-        self.cycle_ticks = -(-_CYCLE_NS * self.crystal_hz // 1_000_000_000)
-        self.select_ticks = -(-_SELECT_NS * self.crystal_hz // 1_000_000_000)
-        self.data_ticks = -(-_DATA_NS * self.crystal_hz // 1_000_000_000)
+        times = [self.ticks(time_us * 270.0 / keys.clock_khz) for time_us in _TIMES_US]
+        self.short_ticks, self.long_ticks, self.count_ticks = times
+        limits = [-(-limit_ns * self.crystal_hz // 1_000_000_000) for limit_ns in _BUS_NS]  # rounded up
+        self.width_ticks, self.cycle_ticks, self.select_ticks, self.data_ticks = limits
         self.powered = 0
         self.entry = self.display = self.function = 0
         self.in_cgram = self.address = self.old_address = self.shift = 0
@@ -151,10 +147,8 @@ class Lcd1602Part(Part):
     def start(self, tick: int) -> None:
         """The internal reset."""
         self.powered = 1
-        self._execute(0b1, tick)
-        self._execute(0b110000, tick)
-        self._execute(0b1000, tick)
-        self._execute(0b110, tick)
+        for instruction in (0b1, 0b110000, 0b1000, 0b110):  # clear, eight wires and one line, off, increment
+            self._execute(instruction, tick)
         self.data = self.half = 0
         self.busy_tick = tick + self.reset_ticks
         self.count_tick = 0
@@ -172,13 +166,7 @@ class Lcd1602Part(Part):
             return
         if pins & _E:
             if self.levels & _E:
-                if (
-                    tick - self.rise_tick < self.cycle_ticks
-                    or pins & _SELECT
-                    or tick - self.select_tick < self.select_ticks
-                ):
-                    self.short_pulses += 1
-                self.rise_tick = tick
+                self._rose(pins, tick)
             else:
                 self._fell(pins, tick)
         if pins & (_E | _SELECT):
@@ -196,7 +184,7 @@ class Lcd1602Part(Part):
         """Drives the data pins while it is read."""
         self.next_tick = _NEVER
         if ~self.levels & (_E | _RW):
-            if self.drives[_D7] != RELEASED or self.wanted[_D7] != RELEASED:
+            if self.wanted[_D7] != RELEASED:
                 for pin in range(_D0, _D7 + 1):
                     self.drive(pin, RELEASED)
             return
@@ -351,9 +339,8 @@ class Lcd1602Part(Part):
         return "".join([_ROM[code] for code in codes]).ljust(width)
 
     def _cursor(self) -> str:
-        if self.display & 4 and self.display & 3 and not self.in_cgram:
-            for row in range(self.rows):
-                places = self._places(row)
-                if self.address in places:
-                    return f"{row + 1}:{places.index(self.address) + 1}"
+        for row in range(self.rows if self.display > 4 and not self.in_cgram else 0):
+            places = self._places(row)
+            if self.address in places:
+                return f"{row + 1}:{places.index(self.address) + 1}"
         return ""
