@@ -85,9 +85,7 @@ def test_what_is_only_for_robots_or_missing_is_refused(mirotwin, scenario, tmp_p
     assert "--record is for robots" in mirotwin.refuses("run", scenario, "--record", "full")
     assert "give --firmware IMAGE.hex" in mirotwin.refuses("run", board, "--for", "1s")
     assert "give --for TIME" in mirotwin.refuses("run", board, "--firmware", scenario.with_name("lamp.hex"))
-    assert "this command takes robots" in mirotwin.refuses("campaign", "run", scenario) + mirotwin.refuses(
-        "serve", scenario
-    )
+    assert "this command takes robots" in mirotwin.refuses("campaign", "run", scenario)
 
 
 def test_a_fault_ends_the_run_with_its_own_code(mirotwin, tmp_path):
