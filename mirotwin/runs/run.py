@@ -15,7 +15,7 @@ from typing import TYPE_CHECKING, Any, BinaryIO
 import msgspec
 
 from miro_exact.bad_input import BadInput
-from miro_exact.clock import CONTROL_PERIOD_TICKS, CYCLE_TICKS, NEVER_TICK, TICKS_PER_SECOND
+from miro_exact.clock import CHARACTER_BITS, CONTROL_PERIOD_TICKS, CYCLE_TICKS, NEVER_TICK, TICKS_PER_SECOND
 from miro_protocol.actions import ScriptItem
 from miro_robot.image import Image
 from miro_sim.periods import Period
@@ -32,7 +32,7 @@ from mirotwin.verify.checks.happens import expect_of
 from mirotwin.verify.checks.interface import Failure
 from mirotwin.verify.checks.monitors import Checks
 from mirotwin.verify.checks.sleep import Sleep
-from mirotwin.verify.steps.keys import ConditionStep, WaitStep
+from mirotwin.verify.steps.keys import ConditionStep, HoldStep, WaitStep
 from mirotwin.verify.steps.player import Player, player_of
 
 if TYPE_CHECKING:
@@ -224,9 +224,12 @@ class Run:
         step = player.steps[player.done]
         if not isinstance(step, ConditionStep) or (isinstance(step, WaitStep) and not failure.timed_out):
             return None
-        name = "happens" if isinstance(step, WaitStep) else "never_happens"
+        name, condition = "happens", step.condition
+        if isinstance(step, HoldStep):
+            name, condition = "never_happens", step.forbidden()
         until_tick = max(failure.tick, self.world.tick)
-        expect = expect_of(name, step.condition, failure.begun_tick, until_tick)
+        alone = isinstance(self.world.scenario, BoardScenario)
+        expect = expect_of(name, condition, failure.begun_tick, until_tick, alone)
         return None if expect is None else self.case_of_expect(expect)
 
     def case_of_expect(self, expect: Mapping[str, Any]) -> str | None:
@@ -236,6 +239,9 @@ class Run:
         """
         world = self.world
         scenario = msgspec.structs.replace(world.scenario, expect=dict(expect))
+        if isinstance(scenario, BoardScenario):  # at the rate at which it was sent
+            bit_ticks = world.lines[0].outbox.character_ticks // CHARACTER_BITS
+            scenario = msgspec.structs.replace(scenario, step=(), bit_ticks=bit_ticks)
         spec = RunSpec(
             scenario=scenario,
             image=world.image,

@@ -4,12 +4,13 @@ from miro_robot.parts.nets cimport Nets
 
 cdef long long CYCLE_TICKS, NEVER_TICK, _BEHIND_TICKS
 cdef unsigned char _TWO_CYCLES[256]
-cdef int REPLAN, STOPPED, _CONTENTION
+cdef int REPLAN, STOPPED, _CONTENTION, _STARVED
 
 
 cdef class WiredBoard(EmptyBoard):
     cdef readonly list parts
     cdef readonly dict part_index
+    cdef readonly list starved
     cdef readonly Nets nets
     cdef long long horizon
     cdef int pushed[4]

@@ -19,8 +19,8 @@ from miro_exact.clock import CYCLE_TICKS, NEVER_TICK
 from miro_exact.plugins import PluginError
 from miro_exact.raised import raised
 from miro_robot.board_spec import BoardSpec
-from miro_robot.empty_board import EmptyBoard
-from miro_robot.faults import FaultKind
+from miro_robot.empty_board import FAULTS_KEPT, EmptyBoard
+from miro_robot.faults import FaultKind, FirmwareFault
 from miro_robot.image import Image
 from miro_robot.mcs51.cpu import REPLAN, STOPPED
 from miro_robot.mcs51.opcodes import CYCLES
@@ -29,6 +29,7 @@ from miro_robot.parts.nets import Nets
 from miro_robot.parts.part import Part
 
 _CONTENTION = int(FaultKind.NET_CONTENTION)
+_STARVED = int(FaultKind.MAIN_LOOP_STARVED)
 _MOVX = (0xE0, 0xE2, 0xE3, 0xF0, 0xF2, 0xF3)  # writes no register but P0, at which nothing is sampled
 _TWO_CYCLES = [int(CYCLES[opcode] == 2 and opcode not in _MOVX) for opcode in range(256)]
 _order_and_kind = itemgetter(0, 1)
@@ -37,10 +38,13 @@ _BEHIND_TICKS = 96  # more than an instruction: so far parts may be behind the C
 
 
 class WiredBoard(EmptyBoard):
-    """`parts` in the order of their names, on the nets of `netlist`. A run raises PluginError for a part that fails."""
+    """`parts` in the order of their names, on the nets of `netlist`. A run raises PluginError for a part that fails.
+
+    `starved`: where interrupts took all of 10 ms from the main loop, which is no fault of a board.
+    """
 
     STATE = {"parts": [Part]}
-    NOT_STATE = ("nets", "horizon", "part_index", "pushed")
+    NOT_STATE = ("nets", "horizon", "part_index", "pushed", "starved")
 
     def __init__(
         self,
@@ -57,7 +61,9 @@ class WiredBoard(EmptyBoard):
         self.nets = Nets(netlist, self.parts)
         self.horizon = -1  # of the piece of a run that the CPU is in; -1 between two runs
         self.pushed = [0xFF] * 4  # what the CPU was given of the ports
+        self.starved: list[FirmwareFault] = []
         EmptyBoard.__init__(self, spec, image, stop_on_fault, stop_at, stop_at_end)
+        self.cpu.main_loop_limit = spec.crystal_hz // (100 * CYCLE_TICKS)  # cycles in 10 ms
         self.nets.ports_changed = 0xF  # straps hold pins from the beginning
         self._supply(1, 0)
 
@@ -154,6 +160,13 @@ class WiredBoard(EmptyBoard):
             self.cpu.replan()
 
     # From the processor
+
+    def fault(self, kind: int, pc: int, tick: int) -> None:
+        """Interrupts may take what time they like; who wants to know of it looks at `starved`."""
+        if kind != _STARVED:
+            EmptyBoard.fault(self, kind, pc, tick)
+        elif len(self.starved) < FAULTS_KEPT:
+            self.starved.append(FirmwareFault(FaultKind(kind), tick, pc, self.image.symbols.name_at(pc)))
 
     def port_written(self, port: int, latch: int, tick: int) -> None:
         nets = self.nets

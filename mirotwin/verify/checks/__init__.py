@@ -22,5 +22,10 @@ OWN = {
     "settles_within_s": "mirotwin.verify.checks.course:SettlesWithin",
     "inside_pitch": "mirotwin.verify.checks.course:InsidePitch",
     "never_sleeps": "mirotwin.verify.checks.serial:NeverSleeps",
+    "one_driver": "mirotwin.verify.checks.faults:OneDriver",
+    "pwm_at_least_hz": "mirotwin.verify.checks.signals:PwmAtLeast",
+    "sends_text": "mirotwin.verify.checks.signals:SendsText",
+    "value_at_most": "mirotwin.verify.checks.signals:ValueAtMost",
+    "value_at_least": "mirotwin.verify.checks.signals:ValueAtLeast",
 }
 """Our own checks: name -> `module:class`. A room above that brings a check adds it here; this file imports nothing."""

@@ -14,18 +14,25 @@ from miro_protocol.frames import ContentError, TelemetryFrame
 from miro_protocol.robot_rules import ANSWER_TICKS, TO_TI_TICKS, AnswerRule
 from miro_protocol.table import TICKS_PER_MS, FrameType
 from miro_sim.world.events import Event
-from mirotwin.verify.checks.interface import Check, Kind, Monitor, Subject, in_ms, ms_ticks
+from mirotwin.verify.checks.interface import Check, Kind, Monitor, Subject, SubjectKind, in_ms, ms_ticks
+from mirotwin.verify.checks.signals import AnswersMonitor
 
 
 class AnswersWithin(Check, frozen=True, kw_only=True, tag="answers_within_ms"):
-    """A question is answered: the answer's last character begins within so long of the question's last character."""
+    """A question is answered: the answer's last character begins within so long of the question's last character.
+
+    Of a board alone: the first character of the answer is sent so soon after the last one that it received.
+    """
 
     KIND: ClassVar[Kind] = "liveness"
+    SUBJECTS: ClassVar[tuple[SubjectKind, ...]] = ("robot", "board")
     MAIN: ClassVar[str] = "within_ms"
 
     within_ms: Annotated[float, Meta(gt=0.0, le=60_000.0)] = ANSWER_TICKS / TICKS_PER_MS
 
     def monitor(self, subject: Subject) -> Monitor[Check]:
+        if subject.alone:
+            return AnswersMonitor(self, subject, self.within_ms)
         return WithinMonitor(self, subject)
 
 

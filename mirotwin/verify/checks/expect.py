@@ -13,18 +13,19 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from functools import cache
-from typing import Any, cast
+from typing import Any, cast, get_args
 
 import msgspec
 
 from miro_exact.bad_input import BadInput
-from miro_exact.plugins import PluginError, Registry
+from miro_exact.plugins import PluginError, Registry, use_one_of
 from miro_exact.raised import raised
 from miro_sim.periods import RobotId
 from miro_sim.scenario.board import BoardScenario
 from miro_sim.scenario.board_scenario import AnyText
 from miro_sim.scenario.errors import Refused, ScenarioError, remedy_for_key, value_error
 from miro_sim.scenario.keys import Scenario
+from miro_sim.world.conditions import CONDITIONS, OnBoard, Recorded
 from mirotwin.verify.checks import OWN
 from mirotwin.verify.checks.interface import Check, problem_of_class
 
@@ -102,13 +103,28 @@ def checks_of_table(
     for name, value in table.items():
         place = f"{path}.{name}"
         try:
-            checks[name] = _check(_struct(name), name, value, scenario.end_tick)
+            check = _check(_struct(name), name, value, scenario.end_tick)
+            if check is not None:
+                _check_subject(check, scenario)
+            checks[name] = check
         except msgspec.ValidationError as error:
             raise _wrong(scenario, origin, place, name, value, f"{error}") from None
         except BadInput as error:
             path_in_file = f"{place}.{error.place}" if error.place else place
             raise ScenarioError(origin, path_in_file, error.what, error.remedy) from error.__cause__
     return checks
+
+
+def _check_subject(check: Check, scenario: Scenario | BoardScenario) -> None:
+    """Raises BadInput for pins and values that the board does not have, or that no check follows at robots."""
+    if isinstance(scenario, BoardScenario):
+        reason, _, remedy = check.problem_alone(scenario).partition("; ")
+        if reason:
+            raise Refused(reason, remedy)
+    condition = getattr(check, "condition", None)
+    if not isinstance(scenario, BoardScenario) and isinstance(condition, OnBoard):
+        recorded = [name for name, struct in CONDITIONS.items() if issubclass(struct, get_args(Recorded))]
+        raise BadInput("", "condition", f"no check follows {condition.what} at robots", use_one_of(recorded))
 
 
 def _struct(name: str) -> type[Check]:
@@ -135,7 +151,8 @@ def _check(struct: type[Check], name: str, value: Any, end_tick: int) -> Check |
         raise Refused(*_takes_a_table(struct, name))
     if bare and not struct.MAIN:
         raise Refused(f"expected true or false, got {value!r}", f"write {name} = true")
-    given = {} if value is True else {struct.MAIN: value} if bare else value
+    is_main = bare or (struct.MAIN_IS_TABLE and isinstance(value, dict) and struct.MAIN not in value)
+    given = {} if value is True else {struct.MAIN: value} if is_main else value
     keys = list(struct.__struct_encode_fields__)
     for key in given:
         if key not in keys:

@@ -46,10 +46,14 @@ class Lm629Protocol(FaultCheck, frozen=True, kw_only=True, tag="lm629_protocol")
 
 
 class MainLoopAlive(FaultCheck, frozen=True, kw_only=True, tag="main_loop_alive"):
-    """Interrupts never take all of 10 ms from the main loop."""
+    """Interrupts never take all of 10 ms from the main loop. It is always on for robots; of a board it is no fault."""
 
+    SUBJECTS = ("robot", "board")
     KINDS = (FaultKind.MAIN_LOOP_STARVED,)
     WANTED = "a main loop that runs every 10 ms"
+
+    def monitor(self, subject: Subject) -> Monitor[Check]:
+        return StarvedMonitor(self, subject) if subject.alone else FaultMonitor(self, subject)
 
 
 class StackClear(FaultCheck, frozen=True, kw_only=True, tag="stack_clear"):
@@ -58,6 +62,14 @@ class StackClear(FaultCheck, frozen=True, kw_only=True, tag="stack_clear"):
     SUBJECTS = ("robot", "board")
     KINDS = STACK_FAULTS
     WANTED = "a stack clear of data"
+
+
+class OneDriver(FaultCheck, frozen=True, kw_only=True, tag="one_driver"):
+    """No two outputs of different level drive one net of a board."""
+
+    SUBJECTS = ("board",)
+    KINDS = (FaultKind.NET_CONTENTION,)
+    WANTED = "one driver a net"
 
 
 class FaultMonitor(Monitor[FaultCheck]):
@@ -70,6 +82,27 @@ class FaultMonitor(Monitor[FaultCheck]):
     def fault(self, fault: FirmwareFault) -> None:
         if fault.kind in self.check.KINDS:
             self.fail(fault.tick, self.check.WANTED, str(fault), fault=True)
+
+
+class StarvedMonitor(Monitor[FaultCheck]):
+    """Of a board with parts, which keeps these apart from its faults. `last_tick`: of the last that was judged."""
+
+    def __init__(self, check: FaultCheck, subject: Subject) -> None:
+        super().__init__(check, subject)
+        self.starved: list[FirmwareFault] = getattr(subject.device.board, "starved", [])
+        if not hasattr(subject.device.board, "starved"):
+            self.unseen = "the board has no parts, and nobody looks at its main loop"
+        self.judged = 1
+        self.last_tick = subject.begin_tick - 1
+
+    def until(self, tick: int) -> None:
+        for fault in self.starved:
+            if self.last_tick < fault.tick < tick:
+                self.last_tick = fault.tick
+                self.fail(fault.tick, self.check.WANTED, str(fault))
+
+    def end(self, tick: int) -> None:
+        self.until(tick + 1)
 
 
 class Lm629Monitor(FaultMonitor):

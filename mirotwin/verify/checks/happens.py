@@ -11,8 +11,10 @@ import msgspec
 from msgspec import Meta
 
 from miro_exact.clock import NEVER_TICK
-from miro_sim.world.conditions import Condition, Recorded
+from miro_sim.scenario.board import BoardScenario
+from miro_sim.world.conditions import Condition, Followed, OnBoard, Recorded, Text
 from miro_sim.world.events import PC, Event
+from mirotwin.verify.checks.following import Following, event_of, unknown_source
 from mirotwin.verify.checks.interface import Check, Kind, Monitor, Subject, SubjectKind, in_ms
 
 Tick = Annotated[int, Meta(ge=-1, lt=NEVER_TICK)]
@@ -22,7 +24,7 @@ class ConditionCheck(Check, frozen=True, kw_only=True):
     """A condition after `after_tick`, up to `until_tick`."""
 
     SUBJECTS: ClassVar[tuple[SubjectKind, ...]] = ("robot", "board")
-    condition: Recorded
+    condition: Recorded | OnBoard
     after_tick: Tick = -1
     until_tick: Tick
 
@@ -35,7 +37,12 @@ class ConditionCheck(Check, frozen=True, kw_only=True):
             return f"until_tick {self.until_tick} is after the end of the run, tick {end_tick}"
         return ""
 
+    def problem_alone(self, scenario: BoardScenario) -> str:
+        return unknown_source(self.condition, scenario)
+
     def monitor(self, subject: Subject) -> Monitor[Check]:
+        if isinstance(self.condition, Followed | Text):
+            return FollowedMonitor(self, subject)
         return ConditionMonitor(self, subject)
 
 
@@ -60,10 +67,7 @@ class ConditionMonitor(Monitor[ConditionCheck]):
         slot = check.condition.at_slot(subject.first_slot)
         place = (check.condition.network, subject.first_slot if slot == PC else slot)
         self.done = place != (subject.network, subject.slot)
-        hertz = subject.clock
-        duration = in_ms(check.until_tick - max(check.after_tick, 0), hertz)
-        within = f"{check.condition} within {duration}"
-        self.wanted = within if check.KIND == "liveness" else f"no {check.condition} for {duration}"
+        self.wanted = wanted(check, subject)
 
     def event(self, event: Event) -> None:
         self.until(event.tick)
@@ -87,9 +91,55 @@ class ConditionMonitor(Monitor[ConditionCheck]):
         self.until(tick + 1)
 
 
-def expect_of(check: str, condition: Condition, after_tick: int, until_tick: int) -> dict[str, Any] | None:
-    """The `[expect]` table of `happens` or `never_happens`; None where no check can judge it, as of pins."""
-    if not isinstance(condition, Recorded):
+class FollowedMonitor(Monitor[ConditionCheck]):
+    """Judges what pins, values and text of a board do."""
+
+    def __init__(self, check: ConditionCheck, subject: Subject) -> None:
+        super().__init__(check, subject)
+        self.EVENTS = ("heard",) if isinstance(check.condition, Text) else ()
+        self.wanted = wanted(check, subject)
+        self.following = Following(check.condition, subject, max(check.after_tick, 0))
+        self.unseen = self.following.unseen
+        self.done = bool(self.unseen)
+
+    def event(self, event: Event) -> None:
+        if event.tick <= self.check.until_tick:
+            self.following.heard(event)
+
+    def until(self, tick: int) -> None:
+        if self.done:
+            return
+        until_tick = self.check.until_tick
+        matches = self.following.matches(min(tick, until_tick))
+        if not matches and tick <= until_tick:
+            return
+        self.done = True
+        self.judged += 1
+        if matches and self.check.KIND == "safety":
+            self.fail(matches[0][0], self.wanted, event_of(self.check.condition, matches[0]))
+        elif not matches and self.check.KIND == "liveness":
+            self.fail(until_tick, self.wanted, self.following.found())
+
+    def end(self, tick: int) -> None:
+        self.until(tick + 1)
+
+
+def wanted(check: ConditionCheck, subject: Subject) -> str:
+    """What a check of one condition asks for, in words."""
+    duration = in_ms(check.until_tick - max(check.after_tick, 0), subject.clock)
+    if check.KIND == "liveness":
+        return f"{check.condition} within {duration}"
+    return f"no {check.condition} for {duration}"
+
+
+def expect_of(
+    check: str, condition: Condition, after_tick: int, until_tick: int, alone: bool = False
+) -> dict[str, Any] | None:
+    """The `[expect]` table of `happens` or `never_happens`; None where no check can judge it, as of a robot's pins.
+
+    `alone`: of a board alone.
+    """
+    if not isinstance(condition, Recorded | OnBoard if alone else Recorded):
         return None
     given = {"condition": msgspec.to_builtins(condition), "after_tick": after_tick, "until_tick": until_tick}
     return {check: given}

@@ -33,6 +33,7 @@ from miro_robot.image import Image
 from miro_robot.mcs51.cpu import Cpu
 from miro_sim.periods import RobotPeriod
 from miro_sim.radio.downlink import Downlink
+from miro_sim.scenario.board import BoardScenario
 from miro_sim.world.events import Event
 from miro_sim.world.robot import Robot
 from mirotwin.shell.verdicts import Verdict
@@ -148,6 +149,8 @@ class Check(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_only=Tru
 
     KIND: ClassVar[Kind]
     MAIN: ClassVar[str] = ""
+    MAIN_IS_TABLE: ClassVar[bool] = False
+    """A table that does not name MAIN is its value: `pwm_at_least_hz = { "P2.0" = 80 }`."""
     SUBJECTS: ClassVar[tuple[SubjectKind, ...]] = ("robot",)
 
     @property
@@ -156,6 +159,10 @@ class Check(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_only=Tru
 
     def problem(self, end_tick: int) -> str:
         """Why a run that ends at `end_tick` cannot be judged, or the empty string."""
+        return ""
+
+    def problem_alone(self, scenario: BoardScenario) -> str:
+        """Why it cannot judge this board, as `key: what; remedy`, or the empty string."""
         return ""
 
     def monitor(self, subject: Subject) -> Monitor[Check]:

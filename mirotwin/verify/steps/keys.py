@@ -25,9 +25,7 @@ from miro_host.wheels import UNITS_PER_COUNT, Wheels, nearest
 from miro_protocol.actions import Power, PutValue, RadioState, Reset
 from miro_protocol.frames import ServiceFrame, TeamFrame
 from miro_protocol.table import DOWNLINK, SEQ_MODULUS, Opcode
-from miro_robot.parts.resolve import resolve
-from miro_robot.parts.values import checked_put, checked_read
-from miro_sim.world.changes import find_pin
+from miro_robot.parts.values import checked_put
 from miro_sim.world.conditions import (
     BOTH,
     Followed,
@@ -39,12 +37,12 @@ from miro_sim.world.conditions import (
     Recorded,
     Slot,
     SpeedMS,
-    Value,
     WheelSpeeds,
     unknown_robot_pin,
 )
 from miro_sim.world.followers import shown
 from miro_sim.world.machine import Feature
+from mirotwin.verify.checks.following import unknown_source
 from mirotwin.verify.checks.interface import Check, in_ms, ms_ticks
 
 if TYPE_CHECKING:
@@ -401,15 +399,7 @@ class ConditionStep(Step, frozen=True, kw_only=True):
         return f"{self.verb} {self.condition.what}"
 
     def problem_alone(self, scenario: BoardScenario) -> str:
-        try:
-            if isinstance(self.condition, OfPin):
-                find_pin(scenario.board, resolve(scenario.board), self.condition.pin)
-            elif isinstance(self.condition, Value):
-                checked_read(scenario.parts, self.condition.of)
-        except ValueError as error:
-            key = "" if isinstance(self.condition, OfPin) else "of: "
-            return f"{key}{error}"
-        return ""
+        return unknown_source(self.condition, scenario)
 
     def problem(self, network: ScenarioNetwork) -> str:
         if isinstance(self.condition, OfPin) and (reason := unknown_robot_pin(self.condition.pin)):
@@ -439,11 +429,10 @@ class HoldStep(ConditionStep, frozen=True, kw_only=True):
     def do(self, player: Player) -> None:
         player.hold(self.condition, self.for_ms, self.verb != "hold")
 
-    def forbidden(self) -> Awaited | None:
-        """The condition that must not become true; None where only a predicate says it."""
-        if self.verb != "hold":
-            return self.condition
-        return self.condition.opposite() if isinstance(self.condition, Followed) else None
+    def forbidden(self) -> Awaited:
+        """The condition that must not become true; that of wheels is none, only a predicate."""
+        condition = self.condition
+        return condition.opposite() if self.verb == "hold" and isinstance(condition, Followed) else condition
 
 
 class SilenceStep(HoldStep, frozen=True, kw_only=True):

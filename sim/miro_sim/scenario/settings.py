@@ -5,6 +5,7 @@ entry: `network.robot.controller.gamma1_per_s`. VALUE is read as TOML, and as te
 replaces a whole table. `variant=NAME` stands for all that the variant changes (`variants`).
 """
 
+import json
 import re
 from collections.abc import Iterable, Sequence
 from typing import Any
@@ -20,6 +21,7 @@ from miro_sim.scenario.profiles import ERROR_KEYS
 from miro_sim.scenario.variants import impose
 
 Table = dict[str, Any]
+_WORD = re.compile(r"[\w-]+")
 EXPECT = "expect."
 OPTION = "--set"
 _TAGS = {registry.key for registry in REGISTRIES.values()}
@@ -72,17 +74,25 @@ def _inside(path: str, above: str) -> bool:
 
 
 def in_text(table: Table, above: str = "") -> list[str]:
-    """The settings KEY=VALUE that a table of them says; a table inside it stands for its keys."""
-    import tomli_w  # only tables of settings need it
-
+    """The settings KEY=VALUE that a table of them says; a table inside it stands for its keys, if these are words."""
     found: list[str] = []
     for key, value in table.items():
         path = f"{above}{key}"
-        if isinstance(value, dict):
+        if isinstance(value, dict) and all(_WORD.fullmatch(inner) for inner in value):
             found += in_text(value, f"{path}.")
         else:
-            found.append(f"{path}={tomli_w.dumps({'x': value}).removeprefix('x = ').rstrip()}")
+            found.append(f"{path}={_inline(value)}")
     return found
+
+
+def _inline(value: Any) -> str:
+    """A value as TOML in one line."""
+    import tomli_w  # only tables of settings need it
+
+    if isinstance(value, dict):  # the names of pins are keys with dots
+        inner = (f"{json.dumps(key)} = {_inline(one)}" for key, one in value.items())
+        return f"{{ {', '.join(inner)} }}"
+    return tomli_w.dumps({"x": value}).removeprefix("x = ").rstrip()
 
 
 def make(raw: Table, settings: Iterable[str], origin: str, option: str = OPTION) -> list[Setting]:

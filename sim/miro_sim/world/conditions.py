@@ -274,10 +274,14 @@ class Followed(AtRobot, frozen=True, kw_only=True):
 
     def opposite(self) -> Self:
         """True exactly while this one is not. Of one that `LASTS`. Raises ValueError where it always is."""
-        if self.DETAILS and not any(getattr(self, key) is not None for key in self.DETAILS[:2]):
-            first, last, _ = self.DETAILS
+        if self.DETAILS and not any(getattr(self, key) is not None for key in self.DETAILS):
+            first, last = self.DETAILS
             raise ValueError(f"{self.what}: no limit is given; give {first}, {last} or both")
         return msgspec.structs.replace(self, outside=not getattr(self, "outside", False))
+
+    def any_of_its_kind(self) -> Self:
+        kind = super().any_of_its_kind()
+        return msgspec.structs.replace(kind, outside=False) if self.LASTS and self.DETAILS else kind
 
     def met_by(self, event: Event) -> bool:
         return event.what == self.what and event.pin == self.source and self.fits(event.measured)
@@ -349,7 +353,7 @@ class Frequency(OfPin, frozen=True, kw_only=True, tag="frequency"):
     """
 
     FOLLOWER = followers.PeriodFollower
-    DETAILS = ("at_least_hz", "at_most_hz", "outside")
+    DETAILS = ("at_least_hz", "at_most_hz")
     LASTS = True
 
     at_least_hz: Hz | None = None
@@ -370,7 +374,7 @@ class Duty(OfPin, frozen=True, kw_only=True, tag="duty"):
     """
 
     FOLLOWER = followers.DutyFollower
-    DETAILS = ("at_least", "at_most", "outside")
+    DETAILS = ("at_least", "at_most")
     LASTS = True
 
     at_least: Share | None = None

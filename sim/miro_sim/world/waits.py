@@ -85,6 +85,7 @@ class Waits:
     def pass_over(self) -> None:
         """What was collected of before the tick of now does not count for the next wait."""
         self.backlog = [entry for entry in self.backlog if entry[0][0] >= self.world.tick]
+        self.ended_tick = -1
 
     def until(self, conditions: Sequence[Condition], within: int | None) -> Event:
         """See `World.run_until`. Raises NotObservable for what the machine does not show."""

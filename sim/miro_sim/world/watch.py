@@ -150,9 +150,8 @@ class Watch:
             return
         if isinstance(condition, OfPin):
             place = changes.find(condition.pin)
-            if tick - 1 == self.after_tick and condition.pin not in self.after_pins:
-                tick = self.after_tick
-            level, serial = changes.level_before(place.net, tick)
+            on_last_tick = tick - 1 == self.after_tick and condition.pin not in self.after_pins
+            level, serial = changes.level_before(place.net, tick - on_last_tick)
             flip = int(place.inverted)
             follower = condition.follower(place.net, flip, clock, tick, level ^ flip)
         else:

@@ -79,7 +79,7 @@ WRONG = {
     "failsafe_stop_ms = [110]": "failsafe_stop_ms: expected a number in milliseconds, got an array",
     "frames_accepted_min = 1.5": "frames_accepted_min: expected a whole number, got a number (1.5)",
     "never_happens.until_tick = 24000\nnever_happens.condition = { event = 'edge', pin = 'rxd' }": (
-        "never_happens.condition.event: 'edge' is not one of the choices"
+        "never_happens.condition: no check follows edge at robots; use answer, heard"
     ),
 }
 
