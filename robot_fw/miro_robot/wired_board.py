@@ -12,6 +12,7 @@ is judged when a tick is over: after its events, or after what the CPU writes on
 from __future__ import annotations
 
 from collections.abc import Sequence
+from math import isfinite
 from operator import attrgetter, itemgetter
 from typing import Any
 
@@ -34,7 +35,13 @@ _MOVX = (0xE0, 0xE2, 0xE3, 0xF0, 0xF2, 0xF3)  # writes no register but P0, at wh
 _TWO_CYCLES = [int(CYCLES[opcode] == 2 and opcode not in _MOVX) for opcode in range(256)]
 _order_and_kind = itemgetter(0, 1)
 _moves = attrgetter("continuous")
+_MOST_VALUE = (1 << 63) - 1  # of an integer, and of its negative
 _BEHIND_TICKS = 96  # more than an instruction: so far parts may be behind the CPU
+
+
+def _plain_type(value: Any) -> Any:
+    """The plain type of a value, which may be of a type of numpy; None if it has none."""
+    return next((plain for plain in (bool, int, float, str) if isinstance(value, plain)), None)
 
 
 class WiredBoard(EmptyBoard):
@@ -221,18 +228,24 @@ class WiredBoard(EmptyBoard):
         return STOPPED if self.stop_on_fault and self.fault_count > faults else 0
 
     def value(self, name: str, key: str) -> float | int | bool | str:
-        """A value of a part as it is now. Raises PluginError for NaN, and for a part that fails."""
+        """A value of a part as it is now, of a plain type. Raises PluginError for what no file can hold (NaN,
+        infinities, integers of more than 63 bits), and for a part that fails.
+        """
         part: Part = self.parts[self.part_index[name]]
         place = f"part {name!r} ({part.keys.name}), tick {self.cpu.cycles * CYCLE_TICKS}, value {key}"
         try:
-            value = part.read(key, min(self.cpu.cycles * CYCLE_TICKS, part.next_tick))
+            value: Any = part.read(key, min(self.cpu.cycles * CYCLE_TICKS, part.next_tick))
         except (Exception, SystemExit) as error:
             raise PluginError(f"{place}: {raised(error)}", "repair the part") from error
-        if not isinstance(value, float | int | str):
+        plain = _plain_type(value)
+        if plain is None:
             raise PluginError(f"{place}: is {type(value).__name__}", "return a number, a text or a boolean")
-        if value != value:
-            raise PluginError(f"{place}: is NaN", "repair the part")
-        return value
+        if plain is float and not isfinite(value):
+            raise PluginError(f"{place}: is {'NaN' if value != value else value}", "repair the part")
+        if plain is int and not -_MOST_VALUE <= value <= _MOST_VALUE:
+            raise PluginError(f"{place}: has more than 63 bits", "repair the part")
+        taken: float | int | bool | str = plain(value)
+        return taken
 
     # RST and supply
 

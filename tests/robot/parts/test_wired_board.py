@@ -371,6 +371,8 @@ class Odd(ScriptedPart):
     ("value", "said"),
     [
         (float("nan"), "part 'a' (scripted), tick 0, value count: is NaN; repair the part"),
+        (float("-inf"), "part 'a' (scripted), tick 0, value count: is -inf; repair the part"),
+        (1 << 63, "part 'a' (scripted), tick 0, value count: has more than 63 bits; repair the part"),
         ([], "part 'a' (scripted), tick 0, value count: is list; return a number, a text or a boolean"),
         (None, "part 'a' (scripted), tick 0, value count: ZeroDivisionError: "),
     ],
