@@ -189,6 +189,7 @@ class Run:
             seed=self.spec.seed,
             digest=world.digest,
             firmware_sha256=world.image.sha256 or "",
+            alone=isinstance(world.scenario, BoardScenario),
         )
 
     # As files
