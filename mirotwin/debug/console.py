@@ -147,7 +147,9 @@ class Console(Cmd):
         """A time that `goto` takes, and where there are several, of whom."""
         hz, cores = self.timeline.run.tick_hz, self.timeline.cores
         name = f"{cores[core].name}  " if len(cores) > 1 else ""
-        return f"{tick / hz:.7f}s  {name}" if hz == TICKS_PER_SECOND else f"{tick}t  {name}"
+        return (
+            f"{tick / hz:.7f}s  {name}" if hz == TICKS_PER_SECOND else f"{tick}t ({tick / hz:.6f} s)  {name}"
+        )
 
     def _goto(self, rest: str) -> None:
         try:

@@ -40,13 +40,17 @@ class DebugSubject(SubjectOptions, frozen=True, kw_only=True):
     sources: SourceFolders = ()
 
 
+_NAMES = {"settings": "set", "parts": "part"}
+"""Options that are called otherwise than their fields."""
+
+
 def launched(given: Mapping[str, Any]) -> DebugSubject:
     """The options of an editor's launch configuration, as `{"subject": "fig6", "slot": 2}`. Raises BadInput.
 
     `linesFrom` is `--lines-from` there.
     """
     fields = [name for name in DebugSubject.__struct_fields__ if name not in ("bare", "subject", "expected")]
-    options = ["set" if name == "settings" else name.replace("_", "-") for name in fields]
+    options = [_NAMES.get(name, name.replace("_", "-")) for name in fields]
     keys = {re.sub("-(.)", lambda match: match[1].upper(), option): option for option in options}
     words: list[str] = []
     for key, option in keys.items():
@@ -86,7 +90,7 @@ def open_subject(options: DebugSubject, everyone: bool = False) -> tuple[Debugge
     elif files and not any(map(symbols.sources.path, files)):
         notes.append("no C files: --sources names their folder")
     with timeline.shown(f"opening {subject}"):
-        if run.job is not None and (run.job.case.verdict or run.job.alone):
+        if run.job is not None and not run.job.recorded and (run.job.case.verdict or run.job.alone):
             verdict = _judged(timeline, run, run.job)
         if verdict is not None:
             why = "case"

@@ -196,6 +196,8 @@ def _robot_run(options: SubjectOptions) -> InspectedRun:
             world = job.spec.world()
         if world.robots:  # whole control periods: what follows a case's failure may be looked at
             end_tick = -(-end_tick // world.period_ticks) * world.period_ticks
+    if not world.robots:
+        _refuse(options, "a board", "network", "slot")
     network, index = _which_robot(world, options)
     return InspectedRun(world, network, index, end_tick, job)
 

@@ -13,6 +13,7 @@ from mirotwin.debug.adapter import Adapter
 from mirotwin.runs.inspected_run import InspectedRun
 from tests import children
 from tests.alone import Alone
+from tests.mirotwin.boards import files_of_board
 from tests.mirotwin.conftest import hex_file
 from tests.mirotwin.debug.runs import debugger_of, robot_run
 from tests.mirotwin.program import COMMAND
@@ -581,3 +582,17 @@ def test_a_stop_at_a_firmware_fault_says_which(adapter, tmp_path):
     stopped = client.until(event="stopped")["body"]
     assert stopped["reason"] == "exception"
     assert stopped["text"].startswith("firmware fault: ")
+
+
+def test_a_board_has_scopes_of_its_parts_and_nets_whose_values_can_be_asked_for(adapter, tmp_path):
+    _, client = adapter
+    board, image = files_of_board(tmp_path)
+    client.begin(subject=f"{board}", firmware=f"{image}", at="10ms")
+    frame = client.ask("stackTrace", threadId=1)["body"]["stackFrames"][0]["id"]
+    scopes = client.ask("scopes", frameId=frame)["body"]["scopes"]
+    references = {one["name"]: one["variablesReference"] for one in scopes}
+    parts = client.ask("variables", variablesReference=references["Parts"])["body"]["variables"]
+    assert [one["name"] for one in parts] == ["key", "lamp"]
+    nets = client.ask("variables", variablesReference=references["Nets"])["body"]["variables"]
+    assert (nets[0]["name"], nets[0]["value"]) == ("KEY", "1")
+    assert client.ask("evaluate", expression="lamp.flashes", frameId=frame)["body"]["result"] == "0"

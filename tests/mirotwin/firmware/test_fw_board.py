@@ -44,6 +44,17 @@ def test_times_are_those_of_the_crystal_of_the_board(mirotwin, board):
     assert CRYSTAL_HZ // 1000 <= ticks[0] < ticks[-1] < CRYSTAL_HZ * 11 // 10_000
 
 
+def test_the_scenario_of_a_board_is_a_subject_with_what_it_puts(mirotwin, board):
+    lines = (
+        'board = "lamp.board.toml"\nfirmware = "lamp.hex"\nduration_s = 0.2\nput = { key.pressed = true }\n'
+    )
+    (board / "lamp.scenario.toml").write_text(lines)
+    assert "lamp.on is true" in mirotwin.succeeds("debug", "lamp.scenario.toml", "-x", "until lamp.on")
+    assert "machine cycles" in mirotwin.succeeds("fw", "profile", "lamp.scenario.toml")
+    said = mirotwin.refuses("fw", "trace", "lamp.scenario.toml", "--slot", 2)
+    assert said == "lamp.scenario.toml: is a board, --slot does not apply to it; leave it out"
+
+
 @pytest.mark.parametrize(
     ("arguments", "said"),
     [

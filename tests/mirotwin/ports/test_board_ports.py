@@ -134,7 +134,7 @@ def test_a_line_that_cannot_be_done_is_said_and_the_session_goes_on(line, said):
 # Sessions
 
 
-def test_a_terminal_program_talks_to_a_board_while_its_parts_are_put(tmp_path):
+def test_a_terminal_program_talks_to_a_board_while_its_parts_are_put(mirotwin, tmp_path):
     files_of_board(tmp_path)
     scenario = tmp_path / "lamp.scenario.toml"
     scenario.write_text('board = "lamp.board.toml"\nfirmware = "lamp.hex"\nduration_s = 1\n')
@@ -151,6 +151,11 @@ def test_a_terminal_program_talks_to_a_board_while_its_parts_are_put(tmp_path):
             serial.serial_for_url(session.ports["rfc2217"][0], baudrate=19_200)
         session.stop()
     assert session.code == 130
+    code, said, _ = mirotwin("replay", out / "run.part.mcap")
+    assert code == 0
+    assert "the board does the same as recorded in all" in said
+    events = ("-x", "until lamp.on", "-x", "until heard byte=0x6f", "-x", "print lamp.on")
+    assert "lamp.on = 1" in mirotwin("debug", out / "run.part.mcap", *events)[1]
     recording = reader.read(out / "run.part.mcap")
     puts = [action.text for period in recording.periods for action in period.actions]
     assert puts == ["key.pressed = true"]
