@@ -202,15 +202,18 @@ def _about(struct: type[PartKeys], text: str) -> str:
     return f"{doc.partition('. ')[0].rstrip('.')}." if doc else text.partition("\n")[0]
 
 
-def _keys(struct: type[msgspec.Struct], above: str = "") -> Iterator[Key]:
-    """The keys of a table, those of tables in it by their paths."""
+def _keys(struct: type[msgspec.Struct], above: str = "", whole: Any = None) -> Iterator[Key]:
+    """The keys of a table, those of tables in it by their paths. `whole`: the table that is the default."""
     for field in inspect.type_info(struct).fields:  # type: ignore[attr-defined]
         key = f"{above}{field.encode_name}"
+        default = field.default if whole is None else getattr(whole, field.name)
         if isinstance(field.type, inspect.StructType):
-            yield from _keys(field.type.cls, f"{key}.")
+            yield from _keys(field.type.cls, f"{key}.", None if default is msgspec.NODEFAULT else default)
             continue
-        default = "" if field.required else msgspec.json.encode(field.default).decode()
-        yield Key(key, takes(field.type, key), default)
+        if default is msgspec.NODEFAULT and field.default_factory is not msgspec.NODEFAULT:
+            default = field.default_factory()
+        shown = "" if default in (msgspec.NODEFAULT, None) else msgspec.json.encode(default).decode()
+        yield Key(key, takes(field.type, key), shown)
 
 
 def takes(kind: inspect.Type, key: str = "") -> str:

@@ -48,6 +48,9 @@ class PartSpec(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_only=
     keys: PartKeys
     pins: dict[str, str] = {}
 
+    def __post_init__(self) -> None:
+        msgspec.structs.force_setattr(self, "pins", dict(sorted(self.pins.items())))
+
 
 class BoardSpec(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_only=True):
     """A tick is a period of the crystal, a machine cycle 12. Without parts it is the bare processor with external RAM.

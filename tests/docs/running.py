@@ -12,7 +12,7 @@ from tests import children
 from tests.docs.shell import commands_of, fits
 
 TEST = re.compile(r"^def (test_\w+)\(", re.MULTILINE)
-GROUPS = ("laws", "estimators", "references", "checks", "protocols")
+GROUPS = ("laws", "estimators", "references", "checks", "protocols", "parts")
 """Entry points that another distribution may have."""
 EXIT_CODE = re.compile(r"exit code (\d+)")
 

@@ -67,7 +67,7 @@ class L298(PartKeys, frozen=True, kw_only=True, tag="l298"):
 
 
 class L293d(L298, frozen=True, kw_only=True, tag="l293d"):
-    """The same with diodes inside: enables 1,2EN and 3,4EN are `ena` and `enb`, inputs 1A to 4A `in1` to `in4`."""
+    """An L293D: two H-bridges with diodes inside. 1,2EN and 3,4EN are `ena` and `enb`, 1A to 4A `in1` to `in4`."""
 
     SHEET = "TI L293x data sheet, SLRS008D: 8.4 'Device functional modes'"
 

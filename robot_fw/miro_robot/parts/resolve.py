@@ -100,6 +100,9 @@ class _Resolver:
                 if name in taken:
                     raise BoardError("", place, f"{taken[name]} has this name, too", "give one another name")
                 taken[name] = place
+        for table in ("straps", "buffers"):
+            for name in getattr(spec, table):
+                self.check_name(name, f"{table}.{name}")
         for name, pins in spec.nets.items():
             for pin in pins:
                 place = f"nets.{name}"

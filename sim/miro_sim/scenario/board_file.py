@@ -27,7 +27,7 @@ from miro_robot.board_spec import (
     PartSpec,
     StrapSpec,
 )  # fmt: skip
-from miro_robot.parts.keys import MOST_PINS, PartKeys, Pin
+from miro_robot.parts.keys import IN, MOST_PINS, OPEN_DRAIN, STRONG, TWO_WAY, PartKeys, Pin
 from miro_robot.parts.resolve import NAME, BoardError, resolve
 from miro_robot.wiring import check_no_wiring
 from miro_sim.scenario.base import is_path
@@ -248,7 +248,7 @@ def keys_of(struct: type[PartKeys], table: dict[str, Any]) -> PartKeys:
 
 
 def check_struct(struct: type[PartKeys]) -> None:
-    """That the pins of a part, which somebody else may have written, can be wired. Raises PluginError."""
+    """That a part, which somebody else may have written, has pins and values as it should. Raises PluginError."""
     name, pins = struct.__struct_config__.tag, struct.PINS
     if not isinstance(pins, tuple) or not all(isinstance(pin, Pin) for pin in pins):
         raise PluginError(f"part {name!r}: PINS are {pins!r:.80}", "write PINS = (Pin(..), Pin(..))")
@@ -256,10 +256,24 @@ def check_struct(struct: type[PartKeys]) -> None:
         what = f"part {name!r} has {amount(len(pins), 'pin')}"
         raise PluginError(what, f"a part has at most {MOST_PART_PINS}")
     names = [pin.name for pin in pins]
-    for pin in names:
-        if not isinstance(pin, str) or not NAME.fullmatch(pin) or names.count(pin) > 1:
-            what = f"part {name!r}: a pin is called {pin!r}"
+    for pin in pins:
+        if not isinstance(pin.name, str) or not NAME.fullmatch(pin.name) or names.count(pin.name) > 1:
+            what = f"part {name!r}: a pin is called {pin.name!r}"
             raise PluginError(what, "give each a name of its own, of letters, digits and _")
+        if pin.kind not in (IN, STRONG, OPEN_DRAIN, TWO_WAY) or pin.level not in (0, 1):
+            what = f"part {name!r}: pin {pin.name} is {pin!r:.120}"
+            raise PluginError(what, "kind is IN, STRONG, OPEN_DRAIN or TWO_WAY, level 0 or 1")
+    for word, values in (("PUTS", struct.PUTS), ("READS", struct.READS)):
+        if not isinstance(values, dict) or not all(isinstance(key, str) for key in values):
+            raise PluginError(f"part {name!r}: {word} is {values!r:.80}", f'write {word} = {{"name": ..}}')
+    for key, kind in struct.PUTS.items():
+        try:
+            msgspec.inspect.type_info(kind)
+        except (Exception, SystemExit) as error:
+            what = f"part {name!r}: PUTS[{key!r}] is no type of a value: {raised(error)}"
+            raise PluginError(
+                what, "use bool, int, float, Literal[..], or Annotated[float, Meta(..)]"
+            ) from error
 
 
 # Writing
