@@ -31,4 +31,4 @@ cdef class L298Part(Part):
     @cython.locals(channel=int, one=Channel)
     cpdef due(self, long long tick)
     @cython.locals(a=Channel, b=Channel)
-    cdef _plan(self)
+    cdef void _plan(self, long long latest) noexcept

@@ -159,7 +159,7 @@ class L298Part(Part):
         for channel in range(2):
             if pins >> (_EN_B if channel else _EN_A) & 7:
                 self._follow(channel, tick)
-        self._plan()
+        self._plan(self.next_tick)  # an event too early costs less than one that moves with each edge
 
     def _follow(self, channel: int, tick: int) -> None:
         """Outputs as the inputs say."""
@@ -182,12 +182,12 @@ class L298Part(Part):
             one: Channel = self.channels[channel]
             if one.still_tick <= tick:
                 one.settle(one.direction)
-        self._plan()
+        self._plan(_NEVER)
 
-    def _plan(self) -> None:
+    def _plan(self, latest: int) -> None:
         a: Channel = self.channels[0]
         b: Channel = self.channels[1]
-        self.next_tick = min(a.still_tick, b.still_tick)
+        self.next_tick = min(latest, a.still_tick, b.still_tick)
 
     def read(self, name: str, tick: int) -> float | int | bool | str:
         channel = "ab".index(name[0])
