@@ -17,7 +17,7 @@ from miro_exact.bad_input import BadInput, amount, did_you_mean
 from miro_exact.inputs import BOARD_BYTES, InputError, read_input
 from miro_exact.plugins import PluginError, use_one_of
 from miro_exact.raised import raised
-from miro_protocol.toml_text import check_numbers, struct_of, tables, what_and_path
+from miro_protocol.toml_text import check_numbers, struct_of, tables, what_and_path, without_none
 from miro_robot.board_spec import (
     CHIPS,
     XRAM_BYTES,
@@ -281,9 +281,10 @@ def check_struct(struct: type[PartKeys]) -> None:
 
 def table_of(spec: BoardSpec) -> dict[str, Any]:
     """A board as the tables of its file: what a recording holds. `board_of_table` reads it."""
-    table = msgspec.to_builtins(spec)
+    table = without_none(msgspec.to_builtins(spec))  # TOML has no null
     table["parts"] = {
-        name: {**msgspec.to_builtins(part.keys), "pins": part.pins} for name, part in spec.parts.items()
+        name: {**without_none(msgspec.to_builtins(part.keys)), "pins": part.pins}
+        for name, part in spec.parts.items()
     }
     if baud := table.pop("baud"):
         table["serial"] = {"baud": baud}

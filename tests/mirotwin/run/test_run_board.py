@@ -4,6 +4,7 @@ import json
 
 import pytest
 
+from miro_robot.firmware import image_path
 from mirotwin.recording.reader import read
 from tests.mirotwin.board_files import board_folder
 
@@ -85,7 +86,6 @@ def test_what_is_only_for_robots_or_missing_is_refused(mirotwin, scenario, tmp_p
     assert "--record is for robots" in mirotwin.refuses("run", scenario, "--record", "full")
     assert "give --firmware IMAGE.hex" in mirotwin.refuses("run", board, "--for", "1s")
     assert "give --for TIME" in mirotwin.refuses("run", board, "--firmware", scenario.with_name("lamp.hex"))
-    assert "this command takes robots" in mirotwin.refuses("campaign", "run", scenario)
 
 
 def test_a_fault_ends_the_run_with_its_own_code(mirotwin, tmp_path):
@@ -142,3 +142,11 @@ def test_a_part_of_ones_own_is_run_and_its_failure_ends_the_run_in_one_line(miro
     out = mirotwin("replay", tmp_path / "out" / "run.part.mcap", "--part", f"{own}:Metronome")
     assert (out[0], "the board does the same as recorded in all 2 control periods" in out[1]) == (0, True)
     mirotwin.refuses("replay", tmp_path / "out" / "run.part.mcap")
+
+
+def test_the_board_of_the_robot_is_run_resumed_and_replayed(mirotwin, tmp_path):
+    words = ("run", "miro", "--firmware", image_path(), "--for", "200ms", "-q")
+    mirotwin.succeeds(*words, "--out", tmp_path / "a", "--save-at", "50ms")
+    mirotwin.succeeds(*words, "--out", tmp_path / "b", "--resume", tmp_path / "a" / "at-1200000.world")
+    assert read(tmp_path / "a" / "run.mcap").digest == read(tmp_path / "b" / "run.mcap").digest
+    assert "the board does the same" in mirotwin.succeeds("replay", tmp_path / "a")
