@@ -201,7 +201,9 @@ class Board(ProcessorBoard):
                 self.bridge_enable[0] = self.left.pwm
                 self.bridge_enable[1] = self.right.pwm
             now = min(self.left.next_tick, self.right.next_tick, self.plant.next_tick)
-            if min(self.left.hi_falls_tick, self.right.hi_falls_tick) <= min(now, tick):
+            falls = min(self.left.hi_falls_tick, self.right.hi_falls_tick)
+            # Not on the tick of an event: the plant has to come there before its chip does both.
+            if falls < now and falls <= tick:
                 self._let_hi_fall()
                 continue
             if now > tick:
@@ -252,10 +254,10 @@ class Board(ProcessorBoard):
         if on == self.powered:
             return
         self.powered = on
+        self.forced = 1
         if on and not self.held:
             self.cpu.reset()
         if not on:
-            self.forced = 1
             self.cpu.hold()
             for address in range(256):
                 # Zeros are chosen, so that a run repeats: silicon has anything there (C7).

@@ -194,9 +194,11 @@ class Lm629Part(Part):
         chip = self.chip
         if chip.port.reading or self.pulled:
             self._pull(~chip.port.drive & 0xFF if chip.port.reading else 0)
-        self.drive(_HI, chip.hi)
-        self.drive(_MAG, chip.pwm)
-        self.drive(_SIGN, chip.sign)
+        if chip.pwm != self.wanted[_MAG]:  # most often: asked first, so that it costs little
+            self.drive(_MAG, chip.pwm)
+        if chip.sign != self.wanted[_SIGN] or chip.hi != self.wanted[_HI]:
+            self.drive(_SIGN, chip.sign)
+            self.drive(_HI, chip.hi)
         self.next_tick = min(chip.next_tick, chip.hi_falls_tick)
         if chip.sample_tick == NEVER_TICK or self.pulses_reach:
             self.reach_tick = self.next_tick

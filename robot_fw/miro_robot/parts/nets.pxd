@@ -57,7 +57,7 @@ cdef class Nets:
     cdef int feeder_end[64]
     cdef int kin[4096]
     cdef int reaches[64]
-    cdef int at_cpu[288]
+    cdef unsigned int cpu_pins[64]
 
     @cython.locals(end=int, index=int, pin=int, net=int, port=int)
     cdef _connect(self, netlist)
@@ -98,8 +98,6 @@ cdef class Nets:
     cdef _check_next(self, Part part, long long tick)
     @cython.locals(reach_tick='long long')
     cdef _check_reach(self, Part part, long long tick)
-    @cython.locals(pin=int, net=int)
-    cdef bint _at_cpu(self, Part part) except -1
     @cython.locals(tick='long long', reach_tick='long long', before='long long', reach_before='long long')
     cdef inline int _look_up(self, int index, Part part) except -1
     @cython.locals(moved='unsigned int', part=Part, place=int, index=int, pin=int)

@@ -209,7 +209,11 @@ class Nets:
         nets = {net for net in netlist.ports if net >= 0}
         nets.update(net for buffer in netlist.buffers for net in buffer)
         nets.update(net for net in range(self.count) if self._may_contend(net, netlist))
-        self.at_cpu = [int(net in nets) for net in range(288)]
+        self.cpu_pins = [0] * 64  # by part, those on these nets, as bits
+        for index, places in enumerate(netlist.parts):
+            for pin, place in enumerate(places):
+                if place.net in nets:
+                    self.cpu_pins[index] |= 1 << pin
         reaching: list[int] = []
         more = [-1]
         while more:
@@ -437,7 +441,7 @@ class Nets:
         """What the part that was called has set, and what it has set of others."""
         if part.next_tick <= tick:
             self._check_next(part, tick)
-        if part.moved and self.called_why != _CHANGED:
+        if part.moved & self.cpu_pins[index] and self.called_why != _CHANGED:
             self._check_reach(part, tick)
         self._look_up(index, part)
         for place in range(self.kin_first[index], self.kin_first[index + 1]):
@@ -451,20 +455,15 @@ class Nets:
             raise PluginError(reason, "set next_tick beyond the tick of the call")
 
     def _check_reach(self, part: Part, tick: int) -> None:
-        """What a part does by itself must not come to the CPU before the tick that it has given."""
+        """What a part does by itself must not come to the CPU before the tick that it has given.
+
+        By way of other parts it is these that have given one.
+        """
         reach_tick = self.reach_ticks[self.called]
-        if tick < reach_tick < _NEVER and self.called_why in (_DUE, _ADVANCE) and self._at_cpu(part):
+        if tick < reach_tick < _NEVER and self.called_why in (_DUE, _ADVANCE):
             self.called_pins = part.moved
             reason = f"drives its pin before its reach_tick {reach_tick}"
             raise PluginError(reason, "set reach_tick to the first tick at which a pin may change, or to 0")
-
-    def _at_cpu(self, part: Part) -> bool:
-        """Whether a pin that has moved is on a net with a port pin; by way of other parts it is theirs to say."""
-        for pin in range(MOST_PINS):
-            net = self.net_of[self.called * MOST_PINS + pin]
-            if part.moved >> pin & 1 and net >= 0 and self.at_cpu[net]:
-                return True
-        return False
 
     def _look_up(self, index: int, part: Part) -> None:
         """`next_tick`, `reach_tick` and driven pins of a part."""

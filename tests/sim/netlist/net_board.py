@@ -8,8 +8,9 @@ import msgspec
 
 from miro_exact import state
 from miro_exact.clock import CYCLE_TICKS
-from miro_robot.board import MAIN_LOOP_LIMIT_CYCLES, Board
+from miro_robot.board import Board
 from miro_robot.build import parts_of
+from miro_robot.empty_board import EmptyBoard
 from miro_robot.lm629.options import Lm629Options
 from miro_robot.parts.lm629 import Lm629Keys
 from miro_robot.parts.resolve import resolve
@@ -17,6 +18,7 @@ from miro_robot.wired_board import WiredBoard
 from miro_sim.scenario.board_file import load_board
 
 _SIDES = ("left", "right")
+_SAMPLED = 9  # S5P2: the tick of a cycle at which pins are sampled
 
 
 def strapped(spec, slot, robots, options):
@@ -45,7 +47,6 @@ class NetBoard(WiredBoard):
         WiredBoard.__init__(self, spec, image, netlist, parts, stop_on_fault)
         self.left.tell(self.log, 0)
         self.right.tell(self.log, 1)
-        self.cpu.main_loop_limit = MAIN_LOOP_LIMIT_CYCLES
         self.input_tick = 0  # characters may come at any time: it never ends
 
     # A run of a `Board` does what is due on its last tick, too; actions come after that.
@@ -64,6 +65,10 @@ class NetBoard(WiredBoard):
         if on != self.powered:
             self.sync(self.cpu.cycles * CYCLE_TICKS)
         WiredBoard.set_power(self, on)
+
+    def fault(self, kind, pc, tick):
+        """A main loop without time is a fault of a robot's firmware."""
+        EmptyBoard.fault(self, kind, pc, tick)
 
     # What a `Board` keeps of its wires.
 
@@ -101,11 +106,11 @@ class NetBoard(WiredBoard):
 
 
 def settle(board):
-    """Chips and plant have done what is due by the end of the last instruction, as they will have by the next one.
+    """Chips and plant have done what is due before the pins are sampled next.
 
-    At the end of a run they may be short of that, or a few ticks beyond its end: there the two boards differ.
+    At the end of a run they may be short of that, and the two boards not by as much.
     """
-    board.sync(board.cpu.cycles * CYCLE_TICKS)
+    board.sync(board.cpu.cycles * CYCLE_TICKS + _SAMPLED)
 
 
 def _entries():

@@ -7,7 +7,7 @@ from hypothesis import strategies as st
 
 from miro_exact.state import Flat
 from miro_robot.board import Board
-from miro_robot.event_log import FAULT
+from miro_robot.event_log import ENDED, FAULT
 from miro_robot.lm629.options import Lm629Options
 from miro_robot.plant import Plant
 from miro_robot.wiring import load_wiring
@@ -40,12 +40,19 @@ DRIVES = st.builds(
 
 
 def as_told_at_once(state):
-    """HI of both chips that change on one tick: the compiled board tells the CPU one after the other, nets at once.
+    """What the CPU was told of its pins, whatever the order on one tick.
 
-    The CPU sees a port as it was told last in a cycle.
+    HI of both chips that change together the compiled board tells one after the other, nets at once; and where the
+    supply goes, the CPU is reset there before, here after the chips. It looks at all that with its next cycle.
     """
-    last = {(cycle, port): levels for cycle, port, levels in state["cpu.peripherals.ports.pending"]}
-    return {**state, "cpu.peripherals.ports.pending": last}
+    ports = "cpu.peripherals.ports."
+    outside, later = list(state[ports + "outside"]), {}
+    for cycle, port, levels in state[ports + "pending"]:
+        if cycle <= state["cpu.cycles"]:
+            outside[port] = levels
+        else:
+            later[cycle, port] = levels
+    return {**state, ports + "outside": outside, ports + "pending": later}
 
 
 def faults_first(event):
@@ -56,6 +63,11 @@ def faults_first(event):
     """
     tick, kind, *_ = event
     return tick, kind != FAULT
+
+
+def wheels():
+    """For each of both boards."""
+    return DifferentialDrive(DriveParams()), DifferentialDrive(DriveParams())
 
 
 class Pair:
@@ -71,7 +83,7 @@ class Pair:
             NetBoard(plants[1], slot, robots, options, stop_on_fault, image=image),
         ]
         self.flats = [Flat(board) for board in self.boards]
-        self.serial = 0
+        self.serials = [0, 0]
         for board in self.boards:
             board.cpu.rxd.settled_tick = 1 << 60
 
@@ -88,17 +100,20 @@ class Pair:
             getattr(board, name)(level)
         self.check()
 
+    def events(self, number):
+        """What a log got since the last call. That a program has ended only a board alone says."""
+        log = self.boards[number].log
+        begin, self.serials[number] = self.serials[number], log.end
+        events = [log.event(serial) for serial in range(max(begin, log.first), log.end)]
+        return [event for event in events if event[1] != ENDED]
+
     def check(self):
         """That both agree in every field, in their logs and faults."""
         if len({flat.save() for flat in self.flats}) > 1:
             ours, theirs = (as_told_at_once(flat.decode(flat.save())) for flat in self.flats)
             assert {name: (ours[name], theirs[name]) for name in ours if ours[name] != theirs[name]} == {}
-        logs = [board.log for board in self.boards]
-        assert logs[0].end == logs[1].end
-        first = max(self.serial, logs[0].first)
-        events = [[log.event(serial) for serial in range(first, log.end)] for log in logs]
-        assert sorted(events[0], key=faults_first) == sorted(events[1], key=faults_first)
-        self.serial = logs[0].end
+        logs = [self.events(number) for number in range(2)]
+        assert sorted(logs[0], key=faults_first) == sorted(logs[1], key=faults_first)
         assert self.boards[0].faults == self.boards[1].faults
 
 
@@ -163,3 +178,50 @@ def test_a_robot_that_drives_asks_and_is_reset_or_switched_off(steps, options, d
         pair.run(tick)
         if action is not None:
             pair.do(*action)
+
+
+VECTORS = "LJMP main\nORG 3h\nINC 40h\nRETI\nORG 13h\nINC 41h\nRETI\nORG 30h\nmain:\n"
+"""Both interrupts of HI are counted."""
+INTERRUPTS = st.sampled_from(
+    [
+        *("SETB IT0", "CLR IT0", "SETB IT1", "CLR IT1", "CLR IE0", "CLR IE1", "MOV TCON,#5", "MOV TCON,#0"),
+        *("MOV IE,#85h", "MOV IE,#0", "MOV 42h,TCON", "ANL TCON,#0FDh", "JBC IE0,$+3", "MOV 44h,P3"),
+        *("MUL AB", "NOP", "INC 43h", "MOV DPTR,#1234h"),
+    ]
+).map(lambda line: [line])
+
+
+@examples(40)
+@given(
+    st.lists(st.one_of(VELOCITY, OFF, MASK, CLEAR, PAUSE, INTERRUPTS, INTERRUPTS), min_size=1, max_size=25),
+    OPTIONS,
+    st.lists(st.integers(1, 12 * MS), max_size=3),
+)
+def test_firmware_that_takes_the_interrupts_of_both_chips(steps, options, cuts):
+    lines = [*FILTER, "loop:", *[line for step in steps for line in step], "LJMP loop"]
+    pair = Pair(VECTORS + RESET + "\n".join(lines), options, wheels())
+    for tick in itertools.accumulate([*cuts, 30 * MS]):
+        pair.run(tick)
+
+
+def test_hi_that_falls_on_the_very_tick_of_a_sample():
+    drive = [*tell(3, 0x1F, 0x1828, 0, 0x4000, 1, 0), *tell(3, 0x01)]
+    ask = [*tell(3, 0x1D, 0), *tell(1, 0x1D, 0)]
+    pair = Pair(
+        VECTORS + RESET + "\n".join([*FILTER, "loop:", *drive, *ask, "LJMP loop"]),
+        Lm629Options(reset_clocks=300, busy_clocks=90),
+        wheels(),
+    )
+    pair.run(99_550)
+    for board in pair.boards:
+        assert (board.left.hi_falls_tick, board.left.sample_tick) == (99_576, 99_576)
+    pair.run(30 * MS)
+
+
+def test_a_supply_that_is_off_for_no_time_is_no_fault_of_the_firmware():
+    pair = Pair(START + "SJMP $")
+    pair.run(MS)
+    pair.do("set_power", 0)
+    pair.do("set_power", 1)
+    pair.run(3 * MS)
+    assert pair.boards[0].faults == []
