@@ -102,6 +102,7 @@ def serve(options: ServeOptions) -> int:
     image = image_for(own, options.firmware)
     with plain_parameters(text.origin):
         run = Run.traced(replace(RunSpec.of(text, image, seed), expected=expected))
+    run.is_session = True
     world = run.world
     run_files = RunFiles(folder, source_of(text, world), run, text.settings)
 

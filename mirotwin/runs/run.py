@@ -50,7 +50,7 @@ class Run:
     """`world`: one of the spec that nobody has moved, or that was moved to where the checks are to begin.
 
     `trace`: what goes into it, None where nobody needs it as a case. `player`: that of its steps. `periods`: those that
-    `play` came past. `tick`: where the run ended, -1 while it goes on.
+    `play` came past. `tick`: where the run ended, -1 while it goes on. `is_session`: a live one, which somebody ends.
     """
 
     def __init__(self, spec: RunSpec, world: World | None = None, trace: Trace | None = None) -> None:
@@ -61,6 +61,7 @@ class Run:
         self.player: Player | None = player_of(self.world, spec.steps, spec.origin)
         self.periods: list[Period] = []
         self.tick = -1
+        self.is_session = False
 
     @classmethod
     def traced(cls, spec: RunSpec, world: World | None = None) -> Run:
@@ -207,8 +208,10 @@ class Run:
 
     @property
     def _end_tick(self) -> int | None:
-        """Where a case of it ends. That of a board leaves another build time to come to its fault."""
-        if not isinstance(self.world.scenario, BoardScenario):
+        """Where a case of it ends; None: where the world is. That of a board leaves another build time to come to its
+        fault, but for a session, whose scenario lasts a day.
+        """
+        if self.is_session or not isinstance(self.world.scenario, BoardScenario):
             return None
         return max(self.world.scenario.end_tick, *(failure.tick for failure in self.failures[:1]), 0)
 

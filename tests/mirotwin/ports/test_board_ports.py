@@ -151,6 +151,7 @@ def test_a_terminal_program_talks_to_a_board_while_its_parts_are_put(mirotwin, t
             serial.serial_for_url(session.ports["rfc2217"][0], baudrate=19_200)
         session.stop()
     assert session.code == 130
+    assert mirotwin("replay", out / "case.part.stream", "--firmware", tmp_path / "lamp.hex")[0] == 0
     code, said, _ = mirotwin("replay", out / "run.part.mcap")
     assert code == 0
     assert "the board does the same as recorded in all" in said
