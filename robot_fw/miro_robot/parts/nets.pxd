@@ -6,6 +6,15 @@ cdef int _WAVES, _CHANGED, _DUE, _ADVANCE, _OTHER
 cdef int MOST_PINS, MOST_PARTS, PORT_PINS, RELEASED, LOW
 
 
+cdef class Observer:
+    cdef readonly object nets
+    cdef public list edges
+    cdef unsigned char wanted[288]
+    cdef long long last_tick
+
+    cpdef note(self, long long tick, int net, int level)
+
+
 cdef class Nets:
     cdef readonly object netlist
     cdef readonly list parts
@@ -74,6 +83,7 @@ cdef class Nets:
     cpdef ignore(self, observer)
     @cython.locals(net=int, number=int, port=int, mask=int)
     cdef _note_observed(self)
+    @cython.locals(observer=Observer)
     cdef _report(self, long long tick, int net, int level)
     @cython.locals(index=int, place=int)
     cpdef int due(self, long long tick) except -1

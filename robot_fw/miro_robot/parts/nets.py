@@ -66,8 +66,16 @@ class Observer:
     def __init__(self, nets: Iterable[int]) -> None:
         self.nets = frozenset(nets)
         self.edges: list[tuple[int, int, int]] = []
+        self.wanted = [0] * 288
+        for net in self.nets:
+            self.wanted[net] = 1
+        self.last_tick = -1
 
     def note(self, tick: int, net: int, level: int) -> None:
+        if tick > self.last_tick:
+            self.last_tick = tick
+            self.edges.append((tick, net, level))
+            return
         place = len(self.edges)
         while place and self.edges[place - 1][0] == tick:
             place -= 1
@@ -316,7 +324,7 @@ class Nets:
 
     def _report(self, tick: int, net: int, level: int) -> None:
         for observer in self.observers:
-            if net in observer.nets:
+            if observer.wanted[net]:
                 observer.note(tick, net, level)
 
     # Time

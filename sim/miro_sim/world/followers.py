@@ -11,7 +11,6 @@ go back.
 from __future__ import annotations
 
 import re
-from collections.abc import Iterable
 from typing import TYPE_CHECKING, Any
 
 from miro_exact.bad_input import amount
@@ -20,28 +19,33 @@ from miro_exact.clock import NEVER_TICK, ms, ticks
 if TYPE_CHECKING:
     from miro_sim.world import conditions
 
+Limits = tuple[float | None, float | None]
 Change = tuple[int, Any, Any]
 Match = tuple[int, Any]
 TEXT_KEPT = 4096
 """Characters that a pattern may reach back."""
 TEXT_SHOWN = 60
+_ENDLESS = 1e300
 
 
 class Follower:
-    """Base. `source`: whose changes it follows; `flip`: 1 for a pin behind an inverter. `clock`: ticks per second.
+    """Base. `source`: whose changes it follows. `clock`: ticks per second.
 
     `count`: measurements so far; `last`: the last of them, at `last_tick`.
     """
 
-    def __init__(self, source: object, flip: int, clock: int) -> None:
+    NOT_STATE = ("*",)
+    FIELDS: tuple[str, ...] = ("count", "last", "last_tick")
+    """What changes while it follows."""
+
+    def __init__(self, source: object, clock: int) -> None:
         self.source = source
-        self.flip = flip
         self.clock = clock
         self.count = 0
         self.last: Any = None
         self.last_tick = -1
 
-    def feed(self, changes: Iterable[Change], until_tick: int) -> list[Match]:
+    def feed(self, changes: list[Change], until_tick: int) -> list[Match]:
         """What fits among these changes, and what fits up to `until_tick` because nothing changes."""
         raise NotImplementedError
 
@@ -49,11 +53,12 @@ class Follower:
         """What was there, for a message."""
         raise NotImplementedError
 
-    def save(self) -> dict[str, Any]:
-        return dict(vars(self))
+    def save(self) -> list[Any]:
+        return [getattr(self, name) for name in self.FIELDS]
 
-    def load(self, saved: dict[str, Any]) -> None:
-        vars(self).update(saved)
+    def load(self, saved: list[Any]) -> None:
+        for name, value in zip(self.FIELDS, saved, strict=True):
+            setattr(self, name, value)
 
     def in_ms(self, duration_ticks: int) -> str:
         return f"{duration_ticks * 1000 / self.clock:.3f} ms"
@@ -65,24 +70,46 @@ class Follower:
         return f"{amount(self.count, kind)}, the last {self.last:.6g}{unit} at {self.in_ms(self.last_tick)}"
 
 
-class EdgeFollower(Follower):
+class PinFollower(Follower):
+    """Base of those of pins, whose source is the number of a net. `flip`: 1 for a pin behind an inverter.
+
+    `least`, `most`: what a measurement must not be below and above, or with `outside` has to.
+    """
+
+    def __init__(
+        self, source: int, flip: int, clock: int, limits: Limits = (None, None), outside: bool = False
+    ) -> None:
+        Follower.__init__(self, source, clock)
+        self.net = source
+        self.flip = flip
+        self.hz = float(clock)
+        least, most = limits
+        self.least = -1.0 if least is None else float(least)
+        self.most = _ENDLESS if most is None else float(most)
+        self.outside = 1 if outside else 0
+
+
+class EdgeFollower(PinFollower):
     """A match is an edge; the measurement its level."""
 
     def __init__(
-        self, condition: conditions.Edge, source: object, flip: int, clock: int, tick: int, level: int
+        self, condition: conditions.Edge, source: int, flip: int, clock: int, tick: int, level: int
     ) -> None:
-        super().__init__(source, flip, clock)
+        PinFollower.__init__(self, source, flip, clock)
         self.wanted = -1 if condition.level is None else condition.level ^ flip
 
-    def feed(self, changes: Iterable[Change], until_tick: int) -> list[Match]:
+    def feed(self, changes: list[Change], until_tick: int) -> list[Match]:
         matches: list[Match] = []
-        mine, wanted = self.source, self.wanted
-        for tick, source, level in changes:
-            if source == mine:
-                self.count += 1
-                self.last_tick, self.last = tick, level ^ self.flip
-                if level == wanted or wanted < 0:
-                    matches.append((tick, self.last))
+        count, last_tick, last = 0, 0, 0
+        for tick, net, level in changes:
+            if net == self.net:
+                count += 1
+                last_tick, last = tick, level ^ self.flip
+                if level == self.wanted or self.wanted < 0:
+                    matches.append((tick, last))
+        if count:
+            self.count += count
+            self.last_tick, self.last = last_tick, last
         return matches
 
     def found(self) -> str:
@@ -92,152 +119,164 @@ class EdgeFollower(Follower):
         return f"{amount(self.count, 'edge')}, {last}"
 
 
-class LevelFollower(Follower):
+class LevelFollower(PinFollower):
     """A match is the moment at which a pin has had a level for so long, from the begin or its last edge on."""
 
+    FIELDS = (*Follower.FIELDS, "longest", "level", "since", "done")
+
     def __init__(
-        self, condition: conditions.Level, source: object, flip: int, clock: int, tick: int, level: int
+        self, condition: conditions.Level, source: int, flip: int, clock: int, tick: int, level: int
     ) -> None:
-        super().__init__(source, flip, clock)
+        PinFollower.__init__(self, source, flip, clock)
         self.wanted = condition.level
         self.steady_ms = condition.steady_ms
         self.steady_ticks = ms(condition.steady_ms, clock)
         self.longest = 0
         self.level = level
         self.since = tick if level == self.wanted else -1
-        self.done = False
+        self.done = 0
 
-    def feed(self, changes: Iterable[Change], until_tick: int) -> list[Match]:
+    def feed(self, changes: list[Change], until_tick: int) -> list[Match]:
         matches: list[Match] = []
-        mine, steady, low = self.source, self.steady_ticks, self.wanted ^ self.flip
-        since = self.since
-        for tick, source, level in changes:
-            if source != mine:
+        wanted = self.wanted ^ self.flip
+        for tick, net, level in changes:
+            if net != self.net:
                 continue
-            if since >= 0:
-                if not self.done and since + steady <= tick:
-                    matches.append((since + steady, self.steady_ms))
-                self.longest = max(self.longest, tick - since)
-                since = -1
-            if level == low:
-                since, self.done = tick, False
+            self._had_until(tick, matches)
             self.level = level ^ self.flip
-        if since >= 0 and not self.done:
-            self.longest = max(self.longest, until_tick - since)
-            if since + steady <= until_tick:
-                matches.append((since + steady, self.steady_ms))
-                self.done = True
-        self.since = since
+            self.since = tick if level == wanted else -1
+            self.done = 0
+        self._had_until(until_tick, matches)
         return matches
+
+    def _had_until(self, tick: int, matches: list[Match]) -> None:
+        if self.since < 0:
+            return
+        self.longest = max(self.longest, tick - self.since)
+        if not self.done and self.since + self.steady_ticks <= tick:
+            matches.append((self.since + self.steady_ticks, self.steady_ms))
+            self.done = 1
 
     def found(self) -> str:
         had = f", and at {self.wanted} for {self.in_ms(self.longest)} at most" if self.longest else ""
         return f"it is at {self.level}{had}"
 
 
-class PulseFollower(Follower):
+class PulseFollower(PinFollower):
     """A match is the end of a pulse that began later than the wait; the measurement its width in microseconds."""
 
+    FIELDS = (*Follower.FIELDS, "began")
+
     def __init__(
-        self, condition: conditions.Pulse, source: object, flip: int, clock: int, tick: int, level: int
+        self, condition: conditions.Pulse, source: int, flip: int, clock: int, tick: int, level: int
     ) -> None:
-        super().__init__(source, flip, clock)
+        limits = (condition.at_least_us, condition.at_most_us)
+        PinFollower.__init__(self, source, flip, clock, limits)
         self.wanted = condition.level ^ flip
-        self.condition = condition
         self.began = -1
 
-    def feed(self, changes: Iterable[Change], until_tick: int) -> list[Match]:
+    def feed(self, changes: list[Change], until_tick: int) -> list[Match]:
         matches: list[Match] = []
-        mine, wanted, clock, fits = self.source, self.wanted, self.clock, self.condition.fits
-        began, width_us, end, count = self.began, self.last, self.last_tick, 0
-        for tick, source, level in changes:
-            if source != mine:
+        began, count, end_tick, width_us = self.began, 0, 0, 0.0
+        for tick, net, level in changes:
+            if net != self.net:
                 continue
-            if level == wanted:
+            if level == self.wanted:
                 began = tick
             elif began >= 0:
                 count += 1
-                width_us, end = (tick - began) * 1e6 / clock, tick
-                if fits(width_us):
+                end_tick, width_us = tick, (tick - began) * 1e6 / self.hz
+                if self.least <= width_us <= self.most:
                     matches.append((tick, width_us))
-        self.began, self.last, self.last_tick = began, width_us, end
-        self.count += count
+        self.began = began
+        if count:
+            self.count += count
+            self.last_tick, self.last = end_tick, width_us
         return matches
 
     def found(self) -> str:
         return self.last_of("pulse", " us")
 
 
-class PeriodFollower(Follower):
+class PeriodFollower(PinFollower):
     """A match is a rising edge with which a period ends that fits; the measurement its frequency in hertz.
 
     Where a signal fits that is too slow, it fits as well as soon as it is that: once, with 0 Hz.
     """
 
+    FIELDS = (*Follower.FIELDS, "rise", "late_tick")
+
     def __init__(
-        self, condition: conditions.Frequency, source: object, flip: int, clock: int, tick: int, level: int
+        self, condition: conditions.Frequency, source: int, flip: int, clock: int, tick: int, level: int
     ) -> None:
-        super().__init__(source, flip, clock)
+        limits = (condition.at_least_hz, condition.at_most_hz)
+        PinFollower.__init__(self, source, flip, clock, limits, condition.outside)
         self.high = 1 ^ flip
-        self.condition = condition
         self.rise = -1
         slowest_hz = condition.at_least_hz if condition.outside else None
         self.patience = NEVER_TICK if slowest_hz is None else ticks(1.0 / slowest_hz, clock)
         self.late_tick = tick + self.patience
 
-    def feed(self, changes: Iterable[Change], until_tick: int) -> list[Match]:
+    def feed(self, changes: list[Change], until_tick: int) -> list[Match]:
         matches: list[Match] = []
-        mine, high, clock, fits = self.source, self.high, self.clock, self.condition.fits
-        rise, late_tick = self.rise, self.late_tick
-        for tick, source, level in changes:
-            if source != mine or level != high:
+        rise, late_tick, count, end_tick, hz = self.rise, self.late_tick, 0, 0, 0.0
+        for tick, net, level in changes:
+            if net != self.net or level != self.high:
                 continue
             if tick > late_tick:
                 matches.append((late_tick, 0.0))
             elif rise >= 0:
-                self.count += 1
-                self.last, self.last_tick = clock / (tick - rise), tick
-                if fits(self.last):
-                    matches.append((tick, self.last))
+                count += 1
+                end_tick, hz = tick, self.hz / (tick - rise)
+                if (1 if self.least <= hz <= self.most else 0) != self.outside:
+                    matches.append((tick, hz))
             rise, late_tick = tick, tick + self.patience
         if until_tick > late_tick:
             matches.append((late_tick, 0.0))
             rise, late_tick = -1, NEVER_TICK
         self.rise, self.late_tick = rise, late_tick
+        if count:
+            self.count += count
+            self.last_tick, self.last = end_tick, hz
         return matches
 
     def found(self) -> str:
         return self.last_of("period", " Hz")
 
 
-class DutyFollower(Follower):
+class DutyFollower(PinFollower):
     """A match is a rising edge with which a period ends; the measurement the share of it in which the pin was high."""
 
-    def __init__(
-        self, condition: conditions.Duty, source: object, flip: int, clock: int, tick: int, level: int
-    ) -> None:
-        super().__init__(source, flip, clock)
-        self.high = 1 ^ flip
-        self.condition = condition
-        self.rise = self.fall = -1
+    FIELDS = (*Follower.FIELDS, "rise", "fall")
 
-    def feed(self, changes: Iterable[Change], until_tick: int) -> list[Match]:
+    def __init__(
+        self, condition: conditions.Duty, source: int, flip: int, clock: int, tick: int, level: int
+    ) -> None:
+        limits = (condition.at_least, condition.at_most)
+        PinFollower.__init__(self, source, flip, clock, limits, condition.outside)
+        self.high = 1 ^ flip
+        self.rise = -1
+        self.fall = -1
+
+    def feed(self, changes: list[Change], until_tick: int) -> list[Match]:
         matches: list[Match] = []
-        mine, high, fits = self.source, self.high, self.condition.fits
-        rise, fall = self.rise, self.fall
-        for tick, source, level in changes:
-            if source != mine:
+        rise, fall, count, end_tick, share = self.rise, self.fall, 0, 0, 0.0
+        for tick, net, level in changes:
+            if net != self.net:
                 continue
-            if level != high:
+            if level != self.high:
                 fall = tick
                 continue
             if rise >= 0:
-                self.count += 1
-                self.last, self.last_tick = (fall - rise) / (tick - rise), tick
-                if fits(self.last):
-                    matches.append((tick, self.last))
+                count += 1
+                end_tick, share = tick, 1.0 * (fall - rise) / (tick - rise)
+                if (1 if self.least <= share <= self.most else 0) != self.outside:
+                    matches.append((tick, share))
             rise = tick
         self.rise, self.fall = rise, fall
+        if count:
+            self.count += count
+            self.last_tick, self.last = end_tick, share
         return matches
 
     def found(self) -> str:
@@ -247,16 +286,18 @@ class DutyFollower(Follower):
 class ValueFollower(Follower):
     """A match is the moment at which a value begins to fit, or is looked at first; the measurement the value."""
 
+    FIELDS = (*Follower.FIELDS, "waiting", "fitted")
+
     def __init__(
         self, condition: conditions.Value, source: object, flip: int, clock: int, tick: int, value: Any
     ) -> None:
-        super().__init__(source, flip, clock)
+        Follower.__init__(self, source, clock)
         condition.fits(value)
         self.condition = condition
         self.waiting: list[Change] = [(tick, source, value)]
         self.fitted = False
 
-    def feed(self, changes: Iterable[Change], until_tick: int) -> list[Match]:
+    def feed(self, changes: list[Change], until_tick: int) -> list[Match]:
         matches: list[Match] = []
         for tick, source, value in [*self.waiting, *changes]:
             if source != self.source:
@@ -278,14 +319,16 @@ class TextFollower(Follower):
     After a match it begins again with the next character.
     """
 
+    FIELDS = (*Follower.FIELDS, "sent", "tail")
+
     def __init__(self, condition: conditions.Text, source: object, clock: int) -> None:
-        super().__init__(source, 0, clock)
+        Follower.__init__(self, source, clock)
         self.text = None if condition.text is None else condition.text.encode()
         self.pattern = None if condition.pattern is None else re.compile(condition.pattern.encode())
         self.sent = b""
         self.tail = b""
 
-    def feed(self, changes: Iterable[Change], until_tick: int) -> list[Match]:
+    def feed(self, changes: list[Change], until_tick: int) -> list[Match]:
         matches: list[Match] = []
         for tick, source, value in changes:
             if source != self.source:

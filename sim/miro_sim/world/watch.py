@@ -71,6 +71,9 @@ class Watch:
         self.after_pins = after_pins
         self.pins: list[PinWatch] = []
         self.followers: list[Followers] = []
+        self.tapped: list[
+            tuple[int, int, str]
+        ] = []  # pins of boards without nets, by the number of their follower
         self.read: list[int] = []  # by follower: the serial number of the next change
 
     def __enter__(self) -> Watch:
@@ -145,7 +148,8 @@ class Watch:
             if not isinstance(condition, Edge):  # an edge is an event as it stands
                 assert isinstance(condition, OfPin)
                 (level,) = (pins.shown[condition.pin] for pins in self.pins if pins.robot_id == robot_id)
-                follower = condition.follower(condition.pin, 0, clock, tick, level)
+                self.tapped.append((*robot_id, condition.pin))
+                follower = condition.follower(len(self.tapped) - 1, 0, clock, tick, level)
                 self.followers.append(Followers(condition, robot_id, follower))
             return
         if isinstance(condition, OfPin):
@@ -169,7 +173,12 @@ class Watch:
         serials: dict[tuple[int, Any], int] = {}
         for key, event in entries:
             if event.what == "edge":
-                pins.append((event.tick, event.pin, event.value))
+                place = (event.network, event.slot, event.pin)
+                pins += [
+                    (event.tick, number, event.value)
+                    for number, one in enumerate(self.tapped)
+                    if one == place
+                ]
             elif event.what == "heard":
                 source = event.network, event.slot
                 text.append((event.tick, source, event.value))
