@@ -26,12 +26,16 @@ from mirotwin.testing.session_options import (
 
 if TYPE_CHECKING:
     from miro_sim.world.machine import Machine
+    from mirotwin.testing.board import BoardUnderTest, SerialUnderTest
     from mirotwin.testing.link import Link
     from mirotwin.testing.port_rig import PortRig
     from mirotwin.testing.rig import Rig
     from mirotwin.testing.robot import RobotUnderTest
 
 _SEED, _RIG = "_mirotwin_seed", "mirotwin_rig"
+NO_BOARD = (
+    'the test is of robots: mark it @pytest.mark.mirotwin(board="NAME.board.toml", firmware="IMAGE.hex")'
+)
 
 
 def pytest_addoption(parser: pytest.Parser) -> None:
@@ -41,7 +45,7 @@ def pytest_addoption(parser: pytest.Parser) -> None:
 def pytest_configure(config: pytest.Config) -> None:
     config.addinivalue_line(
         "markers",
-        "mirotwin(scenario=, settings=, firmware=, seed=, expect=, boot=): the world of the test (mirotwin)",
+        "mirotwin(scenario=, board=, settings=, firmware=, seed=, expect=, boot=): the world of the test (mirotwin)",
     )
     check_options(config)
     if config.getoption("--firmware-coverage") and not config.getoption("--collect-only"):
@@ -113,6 +117,8 @@ def links(mirotwin_rig: Rig | PortRig) -> list[Link]:
 @pytest.fixture
 def link(links: list[Link]) -> Link:
     """The host's end of the first network: sends, polls, expects."""
+    if not links:
+        pytest.fail("the test is of a board, which has no radio: use the fixtures board and serial", False)
     return links[0]
 
 
@@ -125,7 +131,27 @@ def robots(mirotwin_rig: Rig | PortRig) -> list[RobotUnderTest]:
 @pytest.fixture
 def robot(robots: list[RobotUnderTest]) -> RobotUnderTest:
     """The first robot: wheels, memory, breakpoints, switches."""
+    if not robots:
+        pytest.fail("the test is of a board, and no robot: use the fixtures board and serial", False)
     return robots[0]
+
+
+@pytest.fixture
+def board(mirotwin_rig: Rig | PortRig) -> BoardUnderTest:
+    """The board of the marker `mirotwin(board=, firmware=)`: puts, presses, pins, values, waits, memory."""
+    found: BoardUnderTest | None = getattr(mirotwin_rig, "board", None)
+    if found is None:
+        pytest.fail(NO_BOARD, False)
+    return found
+
+
+@pytest.fixture
+def serial(mirotwin_rig: Rig | PortRig) -> SerialUnderTest:
+    """A terminal at the board's serial port: write, expect, read."""
+    found: SerialUnderTest | None = getattr(mirotwin_rig, "serial", None)
+    if found is None:
+        pytest.fail(NO_BOARD, False)
+    return found
 
 
 # Judging and reporting

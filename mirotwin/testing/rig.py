@@ -4,12 +4,14 @@ from __future__ import annotations
 
 import msgspec
 
+from miro_sim.scenario.board import BoardScenario
 from miro_sim.world.events import BoardLog, HostLog
 from miro_sim.world.machine import Machine
 from miro_sim.world.world import World
 from mirotwin.runs.result import Result
 from mirotwin.runs.run import Run
 from mirotwin.shell.firmware_image import BOOT_PERIODS, is_up, not_up
+from mirotwin.testing.board import BoardUnderTest, SerialUnderTest
 from mirotwin.testing.link import Link
 from mirotwin.testing.rig_options import RigOptions
 from mirotwin.testing.robot import RobotUnderTest
@@ -39,6 +41,10 @@ class Rig:
         self.world = self.machine = self.run.world
         self.links = [Link(self.world, network.index) for network in self.world.networks]
         self.robots = [RobotUnderTest(self.world, robot.network, robot.slot) for robot in self.world.robots]
+        self.board: BoardUnderTest | None = None
+        self.serial: SerialUnderTest | None = None
+        if isinstance(self.spec.scenario, BoardScenario):
+            self.board, self.serial = BoardUnderTest(self.world), SerialUnderTest(self.world)
 
     @property
     def tick(self) -> int:
@@ -67,7 +73,7 @@ class Rig:
         """What ran, a line each."""
         image, world = self.world.image, self.world
         return [
-            f"scenario {world.scenario.name}, seed {world.seed}, {at(self.tick)}",
+            f"scenario {world.scenario.name}, seed {world.seed}, {at(self.tick, world.clock)}",
             f"firmware {image.path.name}, {image.sha256[:12]}",
             f"digest {world.digest}",
         ]
@@ -81,7 +87,7 @@ class Rig:
 
         `where`: the folder as commands name it.
         """
-        if any(robot.written for robot in self.robots):
+        if any(device.written for device in (*self.robots, *filter(None, [self.board]))):
             return {}, []
         case = self._case(caught)
         own = foreign_path(self.world.image) is None
@@ -102,14 +108,14 @@ class Rig:
 
 def last_events(machine: Machine, end_tick: int) -> list[str]:
     """What happened last up to `end_tick` (-1: now), a line each."""
-    logs: list[HostLog | BoardLog] = [network.log for network in machine.networks]
-    logs += [robot.log for robot in machine.robots]
+    logs: list[HostLog | BoardLog] = [line.log for line in machine.lines]
+    logs += [device.log for device in machine.devices]
     end_tick = machine.tick if end_tick < 0 else end_tick
     events = [
         event for log in logs for _, event in log.since(log.end - LAST_EVENTS) if event.tick <= end_tick
     ]
     events.sort(key=lambda event: event.tick)
-    return in_words(events[-LAST_EVENTS:])[-LAST_LINES:]
+    return in_words(events[-LAST_EVENTS:], machine)[-LAST_LINES:]
 
 
 def run_for(options: RigOptions) -> Run:
@@ -127,7 +133,7 @@ def run_for(options: RigOptions) -> Run:
     scenario = msgspec.json.encode(msgspec.structs.replace(spec.scenario, expect={}))
     key = (scenario, spec.seed, spec.image.sha256)
     # the coverage of the firmware is to count the same however the tests are spread
-    watched = any(robot.board.cpu.inspector for robot in world.robots)
+    watched = any(device.board.cpu.inspector for device in world.devices)
     saved = None if watched or not options.boot else _STATES.get(key)
     if saved is not None:
         world.load(saved)
@@ -144,6 +150,6 @@ def run_for(options: RigOptions) -> Run:
 def _boot(world: World) -> None:
     for _ in range(BOOT_PERIODS):
         world.step()
-        if world.stopped or all(is_up(robot.board.cpu) for robot in world.robots):
+        if world.stopped or all(is_up(device.board.cpu) for device in world.devices):
             return
     raise not_up(world.image, "boot=False begins a test at power-on")

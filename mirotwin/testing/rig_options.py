@@ -2,6 +2,7 @@
 
     @pytest.mark.mirotwin(scenario="fig6", settings=["duration_s=2"], seed=7, firmware="mine.ihx",
                           expect={"settles_within_s": 2.0}, boot=False)
+    @pytest.mark.mirotwin(board="car.board.toml", firmware="car.hex")      a board, from power-on
 
 A key of the marker holds for its test, one of the innermost marker before others; `settings` and `expect` of all
 markers add up. Options hold for the tests that do not say; a seed from the command line holds for all, because that is
@@ -18,10 +19,13 @@ import msgspec
 
 from miro_exact.bad_input import BadInput, amount, did_you_mean
 from miro_exact.domain import MAX_SEED
-from miro_sim.scenario.file import load
-from miro_sim.scenario.keys import Scenario
+from miro_sim.scenario.board import BoardScenario
+from miro_sim.scenario.board_file import builtin_boards
+from miro_sim.scenario.board_scenario import AnyText, load_any
+from miro_sim.scenario.board_scenario import is_board as is_board_name
+from miro_sim.scenario.file import LONGEST_S, ScenarioText
 from mirotwin.runs.spec import RunSpec, silent_scenario
-from mirotwin.shell.firmware_image import load_firmware
+from mirotwin.shell.firmware_image import image_for
 from mirotwin.verify.checks.expect import expectations_of
 
 if TYPE_CHECKING:
@@ -57,6 +61,7 @@ def _together(marks: Iterable[pytest.Mark]) -> dict[str, Any]:
 
 _TYPES: dict[str, tuple[tuple[type, ...], str]] = {
     "scenario": ((str, Path, dict), "a built-in scenario's name, a path, or a table of settings"),
+    "board": ((str, Path), "the path of a board file, or a built-in board's name"),
     "settings": ((list, tuple), 'a list of "KEY=VALUE"'),
     "firmware": ((str, Path), "the path of an .ihx file"),
     "seed": ((int,), "a whole number"),
@@ -88,25 +93,39 @@ def rig_options(
     if not 0 <= seed <= MAX_SEED:
         raise BadInput("", "seed", f"{seed} is out of range", f"give 0 to {MAX_SEED}")
     mark = _together(marks)
-    scenario = _scenario(mark.get("scenario"), mark["settings"], folder)
+    if "board" in mark and "scenario" in mark:
+        raise BadInput(
+            "", MARKER, "has both board and scenario", "name the scenario alone: it names its board"
+        )
+    text = _text(mark.get("board", mark.get("scenario")), mark["settings"], folder, "board" in mark)
+    scenario = text.scenario
     if scenario.step:
         steps = amount(len(scenario.step), "step")
         reason = f"scenario {scenario.name} has {steps}, which a test in Python does not do"
         raise BadInput("", MARKER, reason, "pytest collects *.scenario.toml files by themselves")
-    image = load_firmware(_near(mark["firmware"], folder) if "firmware" in mark else firmware)
+    image = image_for(text, _near(mark["firmware"], folder) if "firmware" in mark else firmware)
     scenario = msgspec.structs.replace(scenario, expect={**scenario.expect, **mark["expect"]})
-    boot = mark.get("boot", all(one.host == "silent" for one in scenario.networks))
+    is_silent = not isinstance(scenario, BoardScenario) and all(
+        one.host == "silent" for one in scenario.networks
+    )
+    boot = mark.get("boot", is_silent)
     expected = expectations_of(scenario, scenario.name)
     return RigOptions(RunSpec(scenario=scenario, image=image, seed=seed, expected=expected), boot)
 
 
-def _scenario(source: str | Path | dict[str, Any] | None, settings: Sequence[str], folder: Path) -> Scenario:
+def _text(
+    source: str | Path | dict[str, Any] | None, settings: Sequence[str], folder: Path, is_board: bool
+) -> AnyText:
     if source is None or isinstance(source, dict):
         tables = [f"{key}={_toml(value)}" for key, value in (source or {}).items()]
-        return silent_scenario((*tables, *settings))
-    text = str(source)
-    is_path = isinstance(source, Path) or text.endswith(".toml") or "/" in text
-    return load(str(_near(text, folder)) if is_path else text, settings).scenario
+        return ScenarioText("", scenario=silent_scenario((*tables, *settings)))
+    name = str(source)
+    is_path = isinstance(source, Path) or name.endswith(".toml") or "/" in name
+    own = (f"duration_s={LONGEST_S:g}",) if is_board else ()  # a test ends where it ends
+    if is_board and not is_board_name(name):
+        remedy = f"name a file .board.toml, or one of {', '.join(builtin_boards())}"
+        raise BadInput("", MARKER, f"board={name!r} is no board", remedy)
+    return load_any(str(_near(name, folder)) if is_path else name, (*own, *settings))
 
 
 def _near(path: str | Path, folder: Path) -> Path:

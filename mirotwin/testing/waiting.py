@@ -11,10 +11,10 @@ from typing import Any, ParamSpec, TypeVar
 import msgspec
 
 from miro_exact.bad_input import BadInput, amount
+from miro_exact.clock import TICKS_PER_SECOND
 from miro_protocol.decoder import Decoder, Received, Scanner, TelemetryDecoder
 from miro_protocol.frames import ContentError, TeamFrame, describe
-from miro_protocol.table import TICKS_PER_MS
-from miro_sim.world.events import Event
+from miro_sim.world.events import PC, Event
 from miro_sim.world.machine import Machine
 from miro_sim.world.waits import WaitExpired
 from mirotwin.verify.checks.happens import expect_of
@@ -39,13 +39,15 @@ class WaitFailed(AssertionError):
         tick: int,
         seen: Sequence[Event],
         expect: Mapping[str, Any] | None = None,
+        machine: Machine | None = None,
     ) -> None:
         self.begun_tick = begun_tick
         self.tick = tick
         self.seen = list(seen)
         self.expect = expect
-        times = f"from {at(begun_tick)} to {at(tick)}"
-        happened = "\n".join(f"  {line}" for line in in_words(seen)[-LAST_LINES:]) or "  nothing"
+        clock = TICKS_PER_SECOND if machine is None else machine.clock
+        times = f"from {at(begun_tick, clock)} to {at(tick, clock)}"
+        happened = "\n".join(f"  {line}" for line in in_words(seen, machine)[-LAST_LINES:]) or "  nothing"
         count = f", {amount(len(seen), 'event')}" if len(seen) > LAST_LINES else ""
         super().__init__(f"{what}, {times}; meanwhile{count}:\n{happened}")
 
@@ -66,30 +68,36 @@ class WaitFailed(AssertionError):
         """
         begun_tick = expired.begun_tick if begun_tick is None else begun_tick
         what = what or f"no {' or '.join(map(str, expired.conditions))}"
+        what += f", found {expired.found}" if expired.found else ""
         why = f": {why_ended(machine)}" if machine.finished else ""
         seen = [event for event in (*before, *expired.seen) if event.tick >= begun_tick]
         seen.sort(key=lambda event: event.tick)
         expect = None
         if judged and len(expired.conditions) == 1:
-            expect = expect_of("happens", expired.conditions[0], begun_tick, expired.tick)
-        return cls(f"{what}{why}", begun_tick, expired.tick, seen, expect)
+            alone = not machine.networks
+            expect = expect_of("happens", expired.conditions[0], begun_tick, expired.tick, alone)
+        return cls(f"{what}{why}", begun_tick, expired.tick, seen, expect, machine)
 
 
 def why_ended(machine: Machine) -> str:
     """Why a machine goes no further."""
     if machine.stopped:
-        fault = next(fault for robot in machine.robots for fault in robot.board.faults)
+        fault = next(fault for device in machine.devices for fault in device.board.faults)
         return f"the run was stopped by a firmware fault: {fault}"
-    return f"the limit of virtual time was reached, duration_s = {machine.scenario.duration_s:g}"
+    return (
+        f"the limit of virtual time was reached, duration_s = {machine.scenario.end_tick / machine.clock:g}"
+    )
 
 
-def in_words(events: Sequence[Event]) -> list[str]:
+def in_words(events: Sequence[Event], machine: Machine | None = None) -> list[str]:
     """One line each; the characters of a frame are the frame, others that follow each other on one wire are one."""
+    if machine is not None and not machine.networks:  # a wire: the PC receives what a board sends
+        events = [event for event in events if event.what != "transmitted"]
     keyed: list[tuple[object, Event]] = [
         (_place(event) if event.what in CHARACTERS and event.frame is None else number, event)
         for number, event in enumerate(_with_frames(events))
     ]
-    return [_line([event for _, event in run]) for _, run in groupby(keyed, key=itemgetter(0))]
+    return [_line([event for _, event in run], machine) for _, run in groupby(keyed, key=itemgetter(0))]
 
 
 def _with_frames(events: Sequence[Event]) -> list[Event]:
@@ -143,9 +151,12 @@ def _place(event: Event) -> tuple[str, int, int]:
     return (event.what, event.network, event.slot)
 
 
-def _line(run: Sequence[Event]) -> str:
+def _line(run: Sequence[Event], machine: Machine | None) -> str:
     first, when = run[0], "tick"
     _, where, text = f"{first}".split(": ", 2)
+    clock = TICKS_PER_SECOND if machine is None else machine.clock
+    if machine is not None and not machine.networks:
+        where = "PC" if first.slot == PC else "board"
     if first.frame is not None:
         text = _frame_text(first)
     elif first.what == "sent":
@@ -153,7 +164,7 @@ def _line(run: Sequence[Event]) -> str:
     elif len(run) > 1:
         values = " ".join(f"{one.value:02X}{'' if one.good_stop else '!'}" for one in run)
         text, when = f"{first.what} {values}", "from tick"
-    return f"{first.tick / TICKS_PER_MS:10.3f} ms {where}: {text} ({when} {first.tick})"
+    return f"{first.tick * 1000 / clock:10.3f} ms {where}: {text} ({when} {first.tick})"
 
 
 def shown_where_it_was_called(function: Callable[P, T]) -> Callable[P, T]:
