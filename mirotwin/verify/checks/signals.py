@@ -28,7 +28,7 @@ class PwmAtLeast(Check, frozen=True, kw_only=True, tag="pwm_at_least_hz"):
     MAIN_IS_TABLE: ClassVar[bool] = True
 
     pins: Pins
-    off_after_ms: WithinMs = 500.0
+    off_after_ms: WithinMs = 100.0
 
     def problem_alone(self, scenario: BoardScenario) -> str:
         problems = (unknown_source(Frequency(pin=pin), scenario) for pin in self.pins)

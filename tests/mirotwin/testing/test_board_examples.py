@@ -1,10 +1,11 @@
 """The boards among the examples: their tests pass, and their images are what SDCC makes of their sources."""
 
 import shutil
-import subprocess
 from pathlib import Path
 
 import pytest
+
+from tests import children
 
 BOARDS = Path(__file__).parents[3] / "examples" / "boards"
 SOURCES = sorted(BOARDS.glob("*/*.c"))
@@ -21,8 +22,8 @@ def test_the_tests_of_the_three_boards_pass(mirotwin):
 @pytest.mark.parametrize("source", SOURCES, ids=lambda source: source.stem)
 def test_an_image_is_what_its_source_says(source, tmp_path):
     built = tmp_path / source.with_suffix(".ihx").name
-    done = subprocess.run(
-        ["sdcc", "-mmcs51", "--model-small", source, "-o", built], capture_output=True, text=True, check=False
+    done = children.run(
+        ["sdcc", "-mmcs51", "--model-small", source, "-o", built], capture_output=True, text=True
     )
 
     assert done.returncode == 0, done.stderr
