@@ -7,6 +7,7 @@ from miro_robot.mcs51.peripherals cimport Peripherals
 cdef long long NEVER_TICK
 cdef int _OUTSIDE, _MARK, _STOP_REQUESTED, _REPLAN
 cdef int _P0, _PCON, _IE, _IP, _SMOD, _PD, _IDL, _PCON_BITS
+cdef int _SAMPLED_P1, _SAMPLED_P3
 cdef int _READ_SAMPLE, _WRITE_RISES, _FLOATING, _ONE_INSTRUCTION
 cdef unsigned short _LINE[256]
 

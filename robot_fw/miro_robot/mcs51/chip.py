@@ -50,6 +50,7 @@ _LINE = list(LINE)
 _P0, _PCON, _IE, _IP = 0x80, 0x87, 0xA8, 0xB8
 _SMOD, _PD, _IDL = 0x80, 0x02, 0x01  # PCON
 _PCON_BITS = 0x8F  # the others are not implemented and read as 0 (C5)
+_SAMPLED_P1, _SAMPLED_P3 = 0x03, 0x3F  # bits that something on the chip looks at between two instructions
 _READ_SAMPLE, _WRITE_RISES = 17, 18  # ticks into a MOVX: S3P1 and S3P2 of its second cycle end (X1)
 _FLOATING = 0xFF  # what an undriven external bus reads as (X4)
 _ONE_INSTRUCTION = 4  # cycles of the longest: what the hardware lets main level do between two interrupts
@@ -361,10 +362,14 @@ class Chip:
                 self.peripherals.write_p3(value, self.cycles)
             elif port == 1:
                 self.peripherals.sync(self.cycles)
-            self.peripherals.ports.latches[port] = value  # the pins follow with the next cycle
             if port & 1:  # P1 and P3 carry sampled inputs
-                self.next_event = 0
-                self.limit = 0
+                self.peripherals.sample_latches(self.cycles)
+                if (value ^ self.peripherals.ports.latches[port]) & (
+                    _SAMPLED_P1 if port == 1 else _SAMPLED_P3
+                ):
+                    self.next_event = 0
+                    self.limit = 0
+            self.peripherals.ports.latches[port] = value  # the pins follow with the next cycle
             self.bus.port_written(port, value, 12 * self.cycles)
 
     def movx_read(self, address: int) -> int:
@@ -386,6 +391,7 @@ class Chip:
     def before_save(self) -> None:
         """Brings the peripherals up to where the core is. Marks count only while interrupts hold the CPU."""
         self.peripherals.settle(self.cycles)
+        self.peripherals.sample_latches(self.cycles)
         self.peripherals.timers.store()
         if not self._taken_over():
             self.marks = 0
@@ -395,6 +401,7 @@ class Chip:
         if self.bank & ~0x18 or self.user_flags & ~0x22:
             raise ValueError(f"PSW has bank {self.bank:02X}h and flags {self.user_flags:02X}h")
         self.peripherals.check_times(self.cycles)
+        self.peripherals.written = self.cycles
 
     def __repr__(self) -> str:
         return (

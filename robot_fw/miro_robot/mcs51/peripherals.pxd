@@ -28,6 +28,7 @@ cdef class Peripherals:
     cdef int p1, p3
     cdef public int frozen
     cdef int pulsed
+    cdef public long long written
     cdef readonly long long now
     cdef long long timer_wait, serial_wait, quiet
     cdef int timer1_free
@@ -54,6 +55,8 @@ cdef class Peripherals:
     cdef int push(self, int port, int levels, long long tick) except -1
     cdef int apply_pushes(self, long long now) except -1
     cdef int sample_pins(self, long long cycle) except -1
+    @cython.locals(ports=Ports)
+    cdef inline void sample_latches(self, long long cycle) noexcept
     cdef int _inputs_changed(self, int changed1, int changed3, long long cycle) except -1
     cpdef int pin_levels(self, int port, long long cycle) except -1
     cpdef int read(self, int address, long long cycle) except -1

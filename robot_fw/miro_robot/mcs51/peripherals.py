@@ -56,7 +56,7 @@ class Peripherals:
         "frozen": FLAG,
         "p3_reads": TICK,
     }
-    NOT_STATE = ("bus", "pulsed", "now", "timer_wait", "serial_wait", "quiet", "timer1_free")
+    NOT_STATE = ("bus", "written", "pulsed", "now", "timer_wait", "serial_wait", "quiet", "timer1_free")
     """All but the first follow from the registers."""
 
     def __init__(self, bus: Bus) -> None:
@@ -72,6 +72,7 @@ class Peripherals:
         self.p1 = 0xFF  # pins as last sampled
         self.p3 = 0xFF
         self.frozen = 0  # power-down: the oscillator stands
+        self.written = 0  # cycle of the last write to P1 or P3, whose pins are sampled later
         self.pulsed = 0  # a timer that counts a pin clocks the serial port
         self.now = 0  # cycle below which everything has been done that can be noticed
         self.timer1_free = 0  # it clocks no direction of the serial port: writing timers does not touch that
@@ -289,6 +290,14 @@ class Peripherals:
         # T2, T2EX; INT0, INT1, T0, T1. RXD is not among them: the serial port reads its wire between cycles too.
         if not self.frozen and (changed1 & 0x03 or changed3 & 0x3C):
             self._inputs_changed(changed1, changed3, cycle)
+
+    def sample_latches(self, cycle: int) -> None:
+        """Samples bits of P1 and P3 that nothing looks at: each write is seen in the cycle after it, not by `cycle`."""
+        if self.written < cycle:
+            ports = self.ports
+            self.p1 = self.p1 & 0x03 | ports.latches[1] & ports.outside[1] & 0xFC
+            self.p3 = self.p3 & 0x3F | ports.latches[3] & ports.outside[3] & 0xC0
+            self.written = cycle
 
     def _inputs_changed(self, changed1: int, changed3: int, cycle: int) -> None:
         p1 = self.p1

@@ -4,8 +4,13 @@
 """
 
 import pytest
+from hypothesis import given
+from hypothesis import strategies as st
 
-from tests.robot.mcs51.rig import cpu_with, sfr, stepped
+from miro_robot.mcs51.cpu import Cpu
+from tests.robot.mcs51.asm import assemble
+from tests.robot.mcs51.rig import RecordingBus, cpu_with, sfr, stepped
+from tests.states import snapshot
 
 
 def with_p1_held(text, steps):
@@ -111,3 +116,33 @@ def test_of_two_pushes_before_one_sample_the_last_counts():
     cpu.set_external(3, 0xFF, 30)
     cpu.run(6)
     assert sfr(cpu, "TCON") == 0x01
+
+
+class Watchful(RecordingBus):
+    """Has the run end after each write of a port: the next one begins with a look at all pins."""
+
+    def port_written(self, port, latch, tick):
+        self.cpu.request_stop()
+
+
+WRITES = [f"CPL P{port}.{bit}" for port in (1, 3) for bit in range(8) if (port, bit) not in ((3, 0), (3, 1))]
+LONG_WRITES = ["MOV P1,#5Ah", "MOV P3,#0C3h", "XRL P3,#0F0h", "MOV 30h,P1", "MUL AB", "NOP"]
+
+
+@given(
+    st.lists(st.sampled_from(WRITES + LONG_WRITES), min_size=1, max_size=20),
+    st.lists(st.tuples(st.integers(0, 300), st.sampled_from([1, 3]), st.integers(0, 255)), max_size=4),
+    st.integers(1, 40),
+)
+def test_pins_that_nothing_samples_are_as_if_they_were_sampled_after_each_write(lines, pushes, cycles):
+    states = []
+    for bus in (RecordingBus(), Watchful()):
+        cpu = Cpu(bus)
+        bus.cpu = cpu
+        cpu.load(assemble("\n".join([*lines, "SJMP $"])))
+        for tick, port, levels in sorted(pushes):
+            cpu.set_external(port, levels, tick)
+        while cpu.cycles < cycles:
+            cpu.run(cycles)
+        states.append(snapshot(cpu))
+    assert states[0] == states[1]
