@@ -57,7 +57,7 @@ class BoardSpec(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_only
 
     `xram`: where MOVX goes, `xram_bytes` of it if that is external. `code_in_xram`: EA low, program and data share one
     RAM of 64 KB. `start`: address of the first instruction, as after a jump there by a monitor. `bound_stack`: SP that
-    leaves the stack of the image is a fault.
+    leaves the stack of the image is a fault. `check_strobes`: a MOVX while P3.6 or P3.7 holds its strobe is one.
     `nets`: a name for the net of a port pin, or of several. `pull_ups`, `pull_downs`: nets, port pins, whole ports.
     `baud`: of what a terminal sends; 0: the receiver's own rate.
     All tables are in the order of the names, so that the order of a file changes no bit.
@@ -72,6 +72,7 @@ class BoardSpec(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_only
     code_in_xram: bool = False
     start: int = 0
     bound_stack: bool = True
+    check_strobes: bool = False
     pull_ups: tuple[str, ...] = ()
     pull_downs: tuple[str, ...] = ()
     nets: dict[str, tuple[str, ...]] = {}

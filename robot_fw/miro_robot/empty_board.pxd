@@ -3,6 +3,7 @@ from miro_robot.mcs51.uart cimport Uart
 from miro_robot.processor_board cimport ProcessorBoard
 
 cdef long long CYCLE_TICKS, NEVER_TICK, STOPPED_TICK, _CHECK_CYCLES
+cdef int _FLOATING, _MOVX_WITHOUT_STROBE
 cdef int ENDED, FAULT, REACHED, ASLEEP, BREAKPOINT, REPLAN, STOPPED, _EA, _SOURCES, _IE, _PAGE, _BYTES, _DATA_BITS, _ROLLOVERS, _OLD, _FRESH
 
 
@@ -18,6 +19,7 @@ cdef class EmptyBoard(ProcessorBoard):
     cdef public long long fault_count, next_check
     cdef readonly int held, powered
     cdef public int dead, ended
+    cdef int xram_end
     cdef bytearray ram, written
     cdef unsigned char[::1] memory, wrote
     cdef unsigned char touched[256]
@@ -37,5 +39,6 @@ cdef class EmptyBoard(ProcessorBoard):
     cdef tuple _bits(self)
     cpdef bytes xram(self)
     cpdef begin_period(self)
+    cdef _store(self, int address, int value)
     cdef bytes _content(self, int least)
     cdef _put_code(self)

@@ -19,6 +19,7 @@ from miro_robot.board_spec import BoardSpec
 from miro_robot.event_log import ENDED, FAULT, REACHED
 from miro_robot.faults import STACK_FAULTS, FaultKind, FirmwareFault
 from miro_robot.image import Image
+from miro_robot.mcs51.chips import CHIPS
 from miro_robot.mcs51.cpu import ASLEEP, BREAKPOINT, REPLAN, STOPPED
 from miro_robot.mcs51.opcodes import jumps_to_itself, jumps_to_themselves
 from miro_robot.mcs51.uart import STOPPED_TICK
@@ -32,6 +33,8 @@ _IE = 0xA8
 _DATA_BITS, _ROLLOVERS = 8, 16  # of a character; of the serial clock in a bit
 _PAGE = 256  # bytes, and so many pages
 _BYTES = 0x10000
+_FLOATING = 0xFF  # what an undriven bus reads as (X4)
+_MOVX_WITHOUT_STROBE = int(FaultKind.MOVX_WITHOUT_STROBE)
 _OLD, _FRESH = 1, 2  # of a page: it was written, .. since the last digest
 
 
@@ -60,7 +63,7 @@ class EmptyBoard(ProcessorBoard):
     NOT_STATE: tuple[str, ...] = (
         *("spec", "shared", "image", "loops", "stop_at", "stop_at_end"),
         *("sent", "listening", "input_tick", "forced", "again"),
-        *("ram", "memory", "touched", "written", "wrote"),  # what `pages` are made of
+        *("xram_end", "ram", "memory", "touched", "written", "wrote"),  # what `pages` are made of
     )  # fmt: skip
 
     def __init__(
@@ -91,17 +94,23 @@ class EmptyBoard(ProcessorBoard):
         self.loops = jumps_to_themselves(image.code, image.used)
         self.ram = bytearray(image.code if self.shared else _BYTES)
         self.memory = self.ram
+        self.xram_end = spec.xram_bytes if spec.xram == "external" else 0
+        if self.shared:
+            self.xram_end = _BYTES
         self.written = bytearray(_BYTES)  # with code_in_xram: 1 where the program has put code
         self.wrote = self.written
         self.touched = bytearray(_PAGE)
         self.load(image)
+        chip = CHIPS[spec.chip]
+        self.cpu.inner_xram = chip.xram_bytes if spec.xram == "internal" else 0
+        self.cpu.peripherals.has_timer2 = int(chip.has_timer2)
         self.cpu.pc = spec.start
 
     def load(self, image: Image) -> None:
         """Puts the program into the processor's code memory; its symbols name the places of faults."""
         ProcessorBoard.load(self, image)
-        if not self.spec.bound_stack:
-            self.cpu.bound_stack(0, 0xFF)
+        first, last = image.symbols.stack if self.spec.bound_stack else (0, 0xFF)
+        self.cpu.bound_stack(first, min(last, CHIPS[self.spec.chip].iram_bytes - 1))
 
     # Time
 
@@ -249,9 +258,25 @@ class EmptyBoard(ProcessorBoard):
     # From the processor
 
     def movx_read(self, address: int, tick: int) -> int:
-        return self.memory[address]
+        return self.memory[address] if address < self.xram_end else _FLOATING
 
     def movx_write(self, address: int, value: int, tick: int) -> None:
+        if address < self.xram_end:
+            self._store(address, value)
+
+    def inner_read(self, address: int) -> int:
+        return self.memory[address]
+
+    def inner_write(self, address: int, value: int) -> None:
+        self._store(address, value)
+
+    def movx_without_strobe(self, address: int, write: int) -> None:
+        """A fault on boards that are described: on a bare processor nobody says what P3.6 and P3.7 are for."""
+        if self.spec.check_strobes and not self.forced:
+            detail = f"MOVX {'write' if write else 'read'} of {address:#06x}, P3.{6 if write else 7} is 0"
+            self._note_fault(_MOVX_WITHOUT_STROBE, self.cpu.at, self.cpu.cycles * CYCLE_TICKS, detail)
+
+    def _store(self, address: int, value: int) -> None:
         self.memory[address] = value
         self.touched[address >> 8] = _FRESH
         if self.shared:

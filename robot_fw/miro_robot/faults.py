@@ -23,6 +23,7 @@ class FaultKind(IntEnum):
     MAIN_LOOP_STARVED = 8
     INTERRUPT_NOT_LEFT = 9
     NET_CONTENTION = 10
+    MOVX_WITHOUT_STROBE = 11
 
 
 STACK_FAULTS = (FaultKind.STACK_OVERFLOW, FaultKind.STACK_UNDERFLOW)
@@ -38,6 +39,7 @@ DESCRIPTIONS = {
     FaultKind.MAIN_LOOP_STARVED: "starved its main loop: interrupts took all of 10 ms",
     FaultKind.INTERRUPT_NOT_LEFT: "ended an interrupt routine with RET, not RETI (its level stays blocked)",
     FaultKind.NET_CONTENTION: "let two outputs of different level drive one net",
+    FaultKind.MOVX_WITHOUT_STROBE: "used MOVX while P3.6 or P3.7 was latched low: no strobe, nothing happened",
 }
 
 

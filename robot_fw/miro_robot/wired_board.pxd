@@ -4,6 +4,7 @@ from miro_robot.parts.nets cimport Nets
 
 cdef long long CYCLE_TICKS, NEVER_TICK, _BEHIND_TICKS
 cdef unsigned char _TWO_CYCLES[256]
+cdef int _ADDRESS, _RELEASE, _DATA, _STROBE, _SAMPLE, _STROBE_ENDS, _DATA_ENDS, _PAGE_ENDS, _WR, _RD
 cdef int REPLAN, STOPPED, _CONTENTION, _STARVED
 
 
@@ -14,6 +15,13 @@ cdef class WiredBoard(EmptyBoard):
     cdef readonly Nets nets
     cdef long long horizon
     cdef int pushed[4]
+    cdef int on_bus
+    cdef int latch_count, buffer_count
+    cdef int latch_address[8]
+    cdef int latch_mask[8]
+    cdef int buffer_address[8]
+    cdef int buffer_mask[8]
+    cdef unsigned char latched[8]
 
     @cython.locals(faults='long long')
     cdef int _run(self, tuple addresses, long long until_tick) except -1
@@ -23,12 +31,24 @@ cdef class WiredBoard(EmptyBoard):
     cdef int _go_on(self, tuple marks, long long until_cycle) except -1
     @cython.locals(due='long long', due_cycle='long long', stop_cycle='long long', reason=int, faults='long long')
     cdef int _run_pieces(self, long long until_cycle) except -1
+    @cython.locals(now='long long')
+    cdef bint _is_due(self, long long due, long long due_cycle) except -1
     cdef bint _is_before_write(self, long long due_cycle) except -1
     cdef _step(self)
     @cython.locals(now='long long', nets=Nets)
     cpdef int sync(self, long long tick) except -1
     @cython.locals(port=int, nets=Nets)
     cdef inline int _push(self, long long tick) except -1
+    @cython.locals(index=int)
+    cdef _decode(self, spec)
+    @cython.locals(nets=Nets)
+    cdef inline int _put_on_port(self, int port, int latch, long long tick) except -1
+    cdef inline int _before(self, long long tick) except -1
+    @cython.locals(index=int, start='long long')
+    cpdef movx_write(self, int address, int value, long long tick)
+    @cython.locals(index=int, start='long long', value=int)
+    cpdef int movx_read(self, int address, long long tick) except -1
+    cdef int _put_address(self, int address, long long start) except -1
     @cython.locals(net=int)
     cdef _judge(self, long long tick)
     cdef _note_faults(self, long long tick)

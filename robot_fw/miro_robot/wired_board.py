@@ -36,6 +36,10 @@ _TWO_CYCLES = [int(CYCLES[opcode] == 2 and opcode not in _MOVX) for opcode in ra
 _order_and_kind = itemgetter(0, 1)
 _moves = attrgetter("continuous")
 _MOST_VALUE = (1 << 63) - 1  # of an integer, and of its negative
+# Ticks into a MOVX (1919D, timing of external data memory, nominal times): rules X1 and X2 of mcs51/README.md.
+_ADDRESS, _RELEASE, _DATA, _STROBE = 8, 10, 11, 12
+_SAMPLE, _STROBE_ENDS, _DATA_ENDS, _PAGE_ENDS = 17, 18, 19, 20
+_WR, _RD = 0x40, 0x80  # of P3
 _BEHIND_TICKS = 96  # more than an instruction: so far parts may be behind the CPU
 
 
@@ -50,8 +54,11 @@ class WiredBoard(EmptyBoard):
     `starved`: where interrupts took all of 10 ms from the main loop, which is no fault of a board.
     """
 
-    STATE = {"parts": [Part]}
-    NOT_STATE = ("nets", "horizon", "part_index", "pushed", "starved")
+    STATE = {"latched": ("8B", 0, 0xFF), "parts": [Part]}
+    NOT_STATE = (
+        *("nets", "horizon", "part_index", "pushed", "starved", "on_bus"),
+        *("latch_count", "latch_address", "latch_mask", "buffer_count", "buffer_address", "buffer_mask"),
+    )
 
     def __init__(
         self,
@@ -69,10 +76,25 @@ class WiredBoard(EmptyBoard):
         self.horizon = -1  # of the piece of a run that the CPU is in; -1 between two runs
         self.pushed = [0xFF] * 4  # what the CPU was given of the ports
         self.starved: list[FirmwareFault] = []
+        wired = self.nets.wired
+        self.on_bus = 1 if wired[0] or wired[2] or wired[3] & (_WR | _RD) else 0
+        self._decode(spec)
         EmptyBoard.__init__(self, spec, image, stop_on_fault, stop_at, stop_at_end)
         self.cpu.main_loop_limit = spec.crystal_hz // (100 * CYCLE_TICKS)  # cycles in 10 ms
         self.nets.ports_changed = 0xF  # straps hold pins from the beginning
         self._supply(1, 0)
+
+    def _decode(self, spec: BoardSpec) -> None:
+        """Addresses of output latches and input buffers."""
+        self.latch_address, self.latch_mask, self.latched = [0] * 8, [0] * 8, [0] * 8
+        self.buffer_address, self.buffer_mask = [0] * 8, [0] * 8
+        self.latch_count, self.buffer_count = len(spec.latches), len(spec.buffers)
+        for index, latch in enumerate(spec.latches.values()):
+            self.latch_address[index], self.latch_mask[index] = latch.address, latch.mask
+            self.nets.write_latch(index, -1, latch.initial)
+            self.latched[index] = latch.initial
+        for index, buffer in enumerate(spec.buffers.values()):
+            self.buffer_address[index], self.buffer_mask[index] = buffer.address, buffer.mask
 
     # Time
 
@@ -117,17 +139,26 @@ class WiredBoard(EmptyBoard):
             due = self.nets.reach_tick
             due_cycle = (due + 2) // CYCLE_TICKS  # the first whose S5P2 is not before it
             self.horizon = due
-            if due_cycle <= cpu.cycles or self._is_before_write(due_cycle):
+            if self._is_due(due, due_cycle) or self._is_before_write(due_cycle):
                 self.sync(due)
                 if self.stop_on_fault and self.fault_count > faults:
                     return STOPPED
                 continue
             # A cycle before it, too: whether the instruction there goes over it is known there.
-            stop_cycle = due_cycle if cpu.cycles == due_cycle - 1 else due_cycle - 1
+            stop_cycle = max(due_cycle - 1, cpu.cycles + 1)
             reason = cpu.go_on(min(until_cycle, stop_cycle))
             if reason != 0 and (reason != REPLAN or self.again):
                 return reason
         return 0
+
+    def _is_due(self, due: int, due_cycle: int) -> bool:
+        """Whether an event is to be handled before the next instruction; a MOVX moves the pins of its bus before it."""
+        now = self.cpu.cycles
+        if due_cycle > now:
+            return False
+        return not (
+            self.on_bus and due >= now * CYCLE_TICKS + _ADDRESS and self.cpu.code_at(self.cpu.pc) in _MOVX
+        )
 
     def _is_before_write(self, due_cycle: int) -> bool:
         """Whether the pins of `due_cycle` are sampled within the next instruction, which may write a register after.
@@ -176,16 +207,70 @@ class WiredBoard(EmptyBoard):
             self.starved.append(FirmwareFault(FaultKind(kind), tick, pc, self.image.symbols.name_at(pc)))
 
     def port_written(self, port: int, latch: int, tick: int) -> None:
+        self._put_on_port(port, latch, tick)
+
+    def _put_on_port(self, port: int, latch: int, tick: int) -> None:
+        """The levels that the chip drives a port with."""
         nets = self.nets
-        if not (nets.latches[port] ^ latch) & nets.live[port]:
+        if (nets.latches[port] ^ latch) & nets.live[port]:
+            self._before(tick)
+            nets.write_port(port, latch, tick)
+            self._push(tick)
+        else:
             nets.latches[port] = latch
-            return
-        if nets.next_tick <= tick:
+
+    def _before(self, tick: int) -> None:
+        """What parts do before the CPU writes at `tick`; contention on that tick is judged after the write."""
+        if self.nets.next_tick <= tick:
             self.sync(tick - 1)
-            if nets.next_tick == tick:  # what is there for no time is no contention: judged after the write
-                nets.due(tick)
-        nets.write_port(port, latch, tick)
+            if self.nets.next_tick == tick:
+                self.nets.due(tick)
+
+    def movx_write(self, address: int, value: int, tick: int) -> None:
+        """A bus cycle on P0, P2 and /WR, if something is wired there; latches take their byte as /WR rises."""
+        start = tick - _STROBE_ENDS
+        if self.on_bus:
+            self._put_address(address, start)
+            self._put_on_port(0, value, start + _DATA)
+            self._put_on_port(3, self.nets.latches[3] & (0xFF ^ _WR), start + _STROBE)
+        self._before(tick)
+        for index in range(self.latch_count):
+            if address & self.latch_mask[index] == self.latch_address[index]:
+                self.nets.write_latch(index, self.latched[index], value)
+                self.latched[index] = value
+        # /WR and the latches in one: parts see both together.
+        self.nets.put_latch(3, self.nets.latches[3] | (_WR if self.on_bus else 0))
+        self.nets.settle(tick)
         self._push(tick)
+        EmptyBoard.movx_write(self, address, value, tick)
+        if self.on_bus:
+            self._put_on_port(0, 0xFF, start + _DATA_ENDS)
+            self._put_on_port(2, self.cpu.peripherals.ports.latches[2], start + _PAGE_ENDS)
+
+    def movx_read(self, address: int, tick: int) -> int:
+        """A bus cycle on P0, P2 and /RD, if something is wired there: RAM, an input buffer, or what parts put on P0."""
+        start = tick - _SAMPLE
+        if self.on_bus:
+            self._put_address(address, start)
+            self._put_on_port(3, self.nets.latches[3] & (0xFF ^ _RD), start + _STROBE)
+        self.sync(tick)
+        value = EmptyBoard.movx_read(self, address, tick) & self.nets.external[0]
+        for index in range(self.buffer_count):
+            if address & self.buffer_mask[index] == self.buffer_address[index]:
+                value &= self.nets.buffered(index)
+        if self.on_bus:
+            self._put_on_port(3, self.nets.latches[3] | _RD, start + _STROBE_ENDS)
+            self._put_on_port(2, self.cpu.peripherals.ports.latches[2], start + _PAGE_ENDS)
+        return value
+
+    def _put_address(self, address: int, start: int) -> None:
+        """The first half of a MOVX: the address, low byte on P0, high byte on P2; then P0 floats."""
+        self._before(start + _ADDRESS)
+        self.nets.put_latch(2, address >> 8)
+        self._put_on_port(0, address & 0xFF, start + _ADDRESS)
+        self.nets.settle(start + _ADDRESS)
+        self._push(start + _ADDRESS)
+        self._put_on_port(0, 0xFF, start + _RELEASE)
 
     def _judge(self, tick: int) -> None:
         """Contention is a fault where it begins. RST and the supply move pins one after the other: judged after."""
@@ -270,6 +355,10 @@ class WiredBoard(EmptyBoard):
         self.sync(tick - 1)
         nets = self.nets
         nets.powered = on
+        if on:
+            for index, latch in enumerate(self.spec.latches.values()):
+                nets.write_latch(index, self.latched[index], latch.initial)
+                self.latched[index] = latch.initial
         nets.show_all()
         nets.ports_changed = 0xF
         for part in sorted(self.parts, key=_moves):
@@ -295,6 +384,9 @@ class WiredBoard(EmptyBoard):
             self.nets.latches[port] = self.cpu.peripherals.ports.latches[port]
         self.nets.powered = self.powered
         self.nets.restart()
+        for index in range(self.latch_count):
+            self.nets.write_latch(index, -1, self.latched[index])
+        self.nets.show_all()
         for port in range(4):
             self.pushed[port] = self.nets.external[port]
 

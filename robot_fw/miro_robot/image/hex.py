@@ -17,6 +17,7 @@ from miro_robot.image.evidence import Contradiction, check_cdb, check_map
 from miro_robot.image.symbol_files import Symbol, Symbols, parse_cdb, parse_map, read_text
 
 FLASH_BYTES = 8192  # of an AT89C52
+_WITH_FLASH = {4096: "AT89C51", FLASH_BYTES: "AT89C52"}
 SPACE_BYTES = 0x10000
 _DATA, _END, _SEGMENT, _START_SEGMENT, _LINEAR, _START_LINEAR = range(6)  # record types
 _BLANK = b" \t\r\n\v\f\0\x1a"
@@ -160,8 +161,9 @@ def _refuse(beside: Path, found: Contradiction | None) -> None:
 
 
 def _too_big(limit: int) -> str:
-    if limit == FLASH_BYTES:
-        return "the AT89C52 has 8 KB of flash (0x0000-0x1fff): shrink the code or link it lower"
+    if limit in _WITH_FLASH:
+        flash = f"{limit >> 10} KB of flash (0x0000-{limit - 1:#06x})"
+        return f"the {_WITH_FLASH[limit]} has {flash}: shrink the code or link it lower"
     return "link it lower"
 
 

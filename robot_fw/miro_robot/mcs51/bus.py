@@ -24,6 +24,16 @@ class Bus:
     def movx_write(self, address: int, value: int, tick: int) -> None:
         """/WR goes high at `tick` with `value` on P0."""
 
+    def movx_without_strobe(self, address: int, write: int) -> None:
+        """A MOVX that nothing outside notices: P3.6 (`write`) or P3.7 is latched low, so there is no strobe."""
+
+    def inner_read(self, address: int) -> int:
+        """A byte of the chip's own RAM for MOVX."""
+        return 0xFF
+
+    def inner_write(self, address: int, value: int) -> None:
+        """Stores into it."""
+
     def xram(self) -> bytes:
         """All of the external RAM; empty where the board has none."""
         return b""

@@ -28,7 +28,7 @@ cdef class Chip:
     cdef public long long main_loop_limit
     cdef long long next_mark, marks
     cdef int interrupt_returns[2]
-    cdef public int stop_asleep
+    cdef public int stop_asleep, inner_xram
     cdef public object inspector
     cdef unsigned char[::1] edges
     cdef int edge_mask, edge_before, edge_depth
@@ -66,4 +66,5 @@ cdef class Chip:
     @cython.final
     cdef int write_port(self, int port, int value) except -1
     cdef int movx_read(self, int address) except -1
+    cdef inline int page(self) noexcept
     cdef int movx_write(self, int address, int value) except -1

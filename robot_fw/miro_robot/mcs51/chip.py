@@ -98,7 +98,7 @@ class Chip:
         *("stack_floor", "stack_end"),  # where the image's map says that the stack is
         *("at", "start"),  # the instruction in progress: snapshots are taken between two
         *("edges", "edge_mask", "edge_before", "edge_outer", "edge_depth", "highest_sp"),  # what was seen
-        *("bus", "rxd", "txd", "inspector", "main_loop_limit", "stop_asleep"),
+        *("bus", "rxd", "txd", "inspector", "main_loop_limit", "stop_asleep", "inner_xram"),
         *("limit", "until", "stop", "next_event", "next_mark"),
     )
 
@@ -131,6 +131,7 @@ class Chip:
         self.main_loop_limit = 0  # cycles after which interrupts that leave it no time are a fault; 0: never
         self.next_mark = NEVER_TICK
         self.marks = 0  # marks passed since interrupts took over
+        self.inner_xram = 0  # bytes of RAM for MOVX on the chip
         self.stop_asleep = 0  # 1: a run ends with ASLEEP in the cycle from which on nothing known wakes it
         self.interrupt_returns = [
             -1,
@@ -373,18 +374,34 @@ class Chip:
             self.bus.port_written(port, value, 12 * self.cycles)
 
     def movx_read(self, address: int) -> int:
-        """Without a strobe (P3.7 latched low, X3) nothing drives the bus."""
+        """Without a strobe (P3.7 latched low, X3) nothing drives the bus. The chip's own RAM needs no bus."""
+        if address < self.inner_xram:
+            return self.bus.inner_read(address)
         value = _FLOATING
         if self.peripherals.ports.latches[3] & 0x80:
             value = self.bus.movx_read(address, 12 * self.start + _READ_SAMPLE) & 0xFF
+        else:
+            self.bus.movx_without_strobe(address, 0)
         self.write_port(0, 0xFF)
         return value
 
     def movx_write(self, address: int, value: int) -> None:
-        """Without a strobe (P3.6 latched low, X3) nothing is written."""
-        if self.peripherals.ports.latches[3] & 0x40:
-            self.bus.movx_write(address, value, 12 * self.start + _WRITE_RISES)
-        self.write_port(0, 0xFF)
+        """Without a strobe (P3.6 latched low, X3) nothing is written. The chip's own RAM needs no bus."""
+        if address < self.inner_xram:
+            self.bus.inner_write(address, value)
+        else:
+            if self.peripherals.ports.latches[3] & 0x40:
+                self.bus.movx_write(address, value, 12 * self.start + _WRITE_RISES)
+            else:
+                self.bus.movx_without_strobe(address, 1)
+            self.write_port(0, 0xFF)
+
+    def page(self) -> int:
+        """High byte of the address of MOVX @Ri: the pins of P2 keep showing its latch (4316E section 2.6).
+
+        With RAM of its own an STC89C52 reaches that alone in this way (STC89C51RC data sheet, section 4.3).
+        """
+        return 0 if self.inner_xram else self.peripherals.ports.latches[2]
 
     # State
 

@@ -498,8 +498,7 @@ class Cpu(Chip):
             elif row == 0xE0:  # MOVX A,@DPTR
                 self.a = self.movx_read(self.dptr)
             elif row == 0xE2:  # MOVX A,@Ri
-                # With @Ri the pins of P2 keep showing its latch, so that is the page (4316E section 2.6).
-                self.a = self.movx_read(self.read_latch(_P2) << 8 | iram[self.bank + (rom[at] & 1)])
+                self.a = self.movx_read(self.page() << 8 | iram[self.bank + (rom[at] & 1)])
             elif row == 0xE4:  # CLR A
                 self.a = 0
             elif row == 0xE5:  # MOV A,dir
@@ -511,7 +510,7 @@ class Cpu(Chip):
             elif row == 0xF0:  # MOVX @DPTR,A
                 self.movx_write(self.dptr, self.a)
             elif row == 0xF2:  # MOVX @Ri,A
-                self.movx_write(self.read_latch(_P2) << 8 | iram[self.bank + (rom[at] & 1)], self.a)
+                self.movx_write(self.page() << 8 | iram[self.bank + (rom[at] & 1)], self.a)
             elif row == 0xF4:  # CPL A
                 self.a ^= 0xFF
             elif row == 0xF5:  # MOV dir,A

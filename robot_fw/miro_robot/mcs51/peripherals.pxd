@@ -29,6 +29,7 @@ cdef class Peripherals:
     cdef public int frozen
     cdef int pulsed
     cdef public long long written
+    cdef public int has_timer2
     cdef readonly long long now
     cdef long long timer_wait, serial_wait, quiet
     cdef int timer1_free
@@ -67,6 +68,8 @@ cdef class Peripherals:
     cdef inline int _write_timer(self, int address, int value, long long cycle) except -1
     cdef inline void _note_timers(self) noexcept
     cdef void _note_clocks(self, int mode) noexcept
+    @cython.locals(shift=int)
+    cdef int _write_timer2(self, int address, int value, long long cycle) except -1
     cdef int write_serial(self, int address, int value, long long cycle) except -1
     cpdef long long bit_ticks(self) noexcept
     cdef int write_smod(self, int smod, long long cycle) except -1

@@ -56,7 +56,17 @@ class Peripherals:
         "frozen": FLAG,
         "p3_reads": TICK,
     }
-    NOT_STATE = ("bus", "written", "pulsed", "now", "timer_wait", "serial_wait", "quiet", "timer1_free")
+    NOT_STATE = (
+        "bus",
+        "has_timer2",
+        "written",
+        "pulsed",
+        "now",
+        "timer_wait",
+        "serial_wait",
+        "quiet",
+        "timer1_free",
+    )
     """All but the first follow from the registers."""
 
     def __init__(self, bus: Bus) -> None:
@@ -76,6 +86,7 @@ class Peripherals:
         self.pulsed = 0  # a timer that counts a pin clocks the serial port
         self.now = 0  # cycle below which everything has been done that can be noticed
         self.timer1_free = 0  # it clocks no direction of the serial port: writing timers does not touch that
+        self.has_timer2 = 1
         self.p3_reads = 0  # how often the pins of P3 were read: whether software listens on RXD itself
         self.look_again()
 
@@ -361,6 +372,8 @@ class Peripherals:
             return self.interrupts.ip
         if address == _TMOD:
             return self.timers.tmod
+        if not self.has_timer2:
+            return _UNIMPLEMENTED
         if address == _T2CON:
             return self.timer2.control
         if address == _T2MOD:
@@ -442,7 +455,11 @@ class Peripherals:
                 self.shift.send(value, cycle)
             else:
                 self.uart.write_sbuf(value)
-        elif address == _T2CON:
+        elif self.has_timer2:
+            self._write_timer2(address, value, cycle)
+
+    def _write_timer2(self, address: int, value: int, cycle: int) -> None:
+        if address == _T2CON:
             self.timer2.write(value, self.timer2.t2mod, cycle)
         elif address == _T2MOD:
             self.timer2.write(self.timer2.control, value, cycle)

@@ -89,10 +89,13 @@ cdef class Nets:
     cpdef int due(self, long long tick) except -1
     @cython.locals(index=int, tick='long long', reach_tick='long long')
     cdef void _earliest(self) noexcept
-    @cython.locals(changed=int, number=int, net=int)
     cpdef int write_port(self, int port, int latch, long long tick) except -1
+    @cython.locals(changed=int, number=int, net=int)
+    cdef inline void put_latch(self, int port, int latch) noexcept
     @cython.locals(bit=int, net=int)
     cpdef write_latch(self, int index, int before, int after)
+    @cython.locals(levels=int, bit=int, net=int)
+    cpdef int buffered(self, int index) except -1
     @cython.locals(net=int)
     cdef inline void _add_drive(self, int index, int pin, int drive, int count) noexcept
     cdef inline void _add_level(self, int net, int level, int count) noexcept

@@ -275,12 +275,13 @@ class Nets:
         for net in range(len(self.all_names)):
             self.levels[net] = self._level(net, 0, 0)
             self.contended[net] = 1 if self.lows[net] and self.highs[net] else 0
+            self.is_touched[net] = 0
             self._show(net)
             self._show_ports(net)
         for index in range(self.part_count):
             self.parts[index].pending = self.is_waiting[index] = 0
             self._look_up(index, self.parts[index])
-        self.waiting_count = 0
+        self.waiting_count = self.touched_count = 0
         self.ports_changed = 0
 
     def _latched(self, number: int) -> int:
@@ -358,6 +359,11 @@ class Nets:
 
     def write_port(self, port: int, latch: int, tick: int) -> None:
         """The latch of a port has changed: all its bits at once, then waves."""
+        self.put_latch(port, latch)
+        self.settle(tick)
+
+    def put_latch(self, port: int, latch: int) -> None:
+        """A port drives other levels; no waves yet."""
         changed = (self.latches[port] ^ latch) & self.live[port]
         self.latches[port] = latch
         number = 8 * port
@@ -368,7 +374,6 @@ class Nets:
                 self._touch(net)
             changed >>= 1
             number += 1
-        self.settle(tick)
 
     def write_latch(self, index: int, before: int, after: int) -> None:
         """An output latch of MOVX stores a byte; no waves yet. `before` is -1 where it begins to drive."""
@@ -379,6 +384,14 @@ class Nets:
                     self._add_level(net, before >> bit & 1, -1)
                 self._add_level(net, after >> bit & 1, 1)
                 self._touch(net)
+
+    def buffered(self, index: int) -> int:
+        """The levels at an input buffer of MOVX; 1 where nothing is connected."""
+        levels = 0xFF
+        for bit, net in enumerate(self.netlist.buffers[index]):
+            if net >= 0 and not self.levels[net]:
+                levels &= ~(1 << bit)
+        return levels
 
     def _add_drive(self, index: int, pin: int, drive: int, count: int) -> None:
         """A driver comes (1) or goes (-1)."""
