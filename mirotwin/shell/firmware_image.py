@@ -14,7 +14,7 @@ from miro_exact.bad_input import BadInput
 from miro_exact.clock import CONTROL_PERIOD_TICKS, TICKS_PER_SECOND
 from miro_exact.inputs import check_regular
 from miro_robot.firmware import image_path
-from miro_robot.image import FLASH_BYTES, SPACE_BYTES, Image, load_hex
+from miro_robot.image import FLASH_BYTES, Image, load_hex
 from miro_robot.image.symbol_files import STACK
 
 if TYPE_CHECKING:
@@ -57,7 +57,10 @@ def image_for(text: AnyText, firmware: str | Path | None = None, stack_from: int
 
     if not isinstance(text, BoardText):
         return load_firmware(firmware, stack_from=stack_from)
-    return load_firmware(firmware or firmware_beside(text), SPACE_BYTES, stack_from=stack_from)
+    from miro_robot.mcs51.chips import CHIPS
+
+    limit = CHIPS[text.scenario.board.chip].flash_bytes
+    return load_firmware(firmware or firmware_beside(text), limit, stack_from=stack_from)
 
 
 BOOT_PERIODS = 8

@@ -12,8 +12,6 @@ from miro_robot.parts.keys import PartKeys
 CRYSTAL_HZ = 24_000_000
 CRYSTAL_RANGE_HZ = (32_768, 100_000_000)
 XRAM_BYTES = 0x10000
-CHIPS = {"at89c51": False, "at89c52": False, "at89s52": False, "stc89c52": True}
-"""Chip, and whether it has RAM of its own for MOVX."""
 
 Address = Annotated[int, Meta(ge=0, le=0xFFFF)]
 Byte = Annotated[int, Meta(ge=0, le=0xFF)]

@@ -5,7 +5,6 @@ from miro_robot.parts.nets cimport Nets
 cdef long long CYCLE_TICKS, NEVER_TICK, _BEHIND_TICKS
 cdef unsigned char _TWO_CYCLES[256]
 cdef int _ADDRESS, _RELEASE, _DATA, _STROBE, _SAMPLE, _STROBE_ENDS, _DATA_ENDS, _PAGE_ENDS, _WR, _RD
-cdef int REPLAN, STOPPED, _CONTENTION, _STARVED
 
 
 cdef class WiredBoard(EmptyBoard):

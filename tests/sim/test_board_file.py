@@ -138,6 +138,7 @@ def test_a_file_is_read_as_it_says():
         chip="stc89c52",
         crystal_hz=11_059_200,
         xram_bytes=0x4000,
+        check_strobes=True,
         pull_ups=("P0", "SDA"),
         pull_downs=("P2.0",),
         nets={"SDA": ("P2.1",), "START": ("P3.2", "P1.7")},

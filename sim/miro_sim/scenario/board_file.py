@@ -19,7 +19,6 @@ from miro_exact.plugins import PluginError, use_one_of
 from miro_exact.raised import raised
 from miro_protocol.toml_text import check_numbers, struct_of, tables, what_and_path, without_none
 from miro_robot.board_spec import (
-    CHIPS,
     XRAM_BYTES,
     BoardSpec,
     BufferSpec,
@@ -27,6 +26,7 @@ from miro_robot.board_spec import (
     PartSpec,
     StrapSpec,
 )  # fmt: skip
+from miro_robot.mcs51.chips import CHIPS
 from miro_robot.parts.keys import IN, MOST_PINS, OPEN_DRAIN, STRONG, TWO_WAY, PartKeys, Pin
 from miro_robot.parts.resolve import NAME, BoardError, resolve
 from miro_robot.wiring import check_no_wiring
@@ -154,6 +154,7 @@ def _spec(file: _File, parts: dict[str, PartSpec], name: str) -> BoardSpec:
         crystal_hz=file.crystal_hz,
         xram=file.xram,
         xram_bytes=_xram_bytes(file),
+        check_strobes=True,
         pull_ups=file.pull_ups,
         pull_downs=file.pull_downs,
         nets={net: (pins,) if isinstance(pins, str) else pins for net, pins in file.nets.items()},
@@ -173,8 +174,8 @@ def _check_processor(file: _File) -> None:
         what = "6T mode is not modelled" if file.mode == "6T" else f"{file.mode!r} is no mode"
         remedy = "leave it out and give twice the crystal as crystal_hz" if file.mode == "6T" else 'use "12T"'
         raise BoardError("", "mode", what, remedy)
-    if file.xram == "internal" and not CHIPS[file.chip]:
-        having = [chip for chip, internal in CHIPS.items() if internal]
+    if file.xram == "internal" and not CHIPS[file.chip].xram_bytes:
+        having = [chip for chip, kind in CHIPS.items() if kind.xram_bytes]
         what = f"{file.chip} has no RAM of its own for MOVX"
         raise BoardError("", "xram", what, f'use "none" or "external", or chip = "{having[0]}"')
 
@@ -290,6 +291,6 @@ def table_of(spec: BoardSpec) -> dict[str, Any]:
         table["serial"] = {"baud": baud}
     if spec.xram != "external":
         del table["xram_bytes"]
-    for key in ("code_in_xram", "start", "bound_stack"):  # a board file has none of these
+    for key in ("code_in_xram", "start", "bound_stack", "check_strobes"):  # a board file has none of these
         del table[key]
     return {key: value for key, value in table.items() if value not in ([], (), {})}

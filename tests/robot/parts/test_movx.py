@@ -5,6 +5,7 @@ import pytest
 from miro_robot.board_spec import BoardSpec, BufferSpec, LatchSpec, PartSpec
 from miro_robot.build import board_of
 from miro_robot.faults import FaultKind
+from miro_robot.image import ImageError, load_hex
 from miro_robot.mcs51.chips import CHIPS
 from miro_robot.mcs51.cpu import STOPPED
 from miro_robot.parts.keys import RELEASED
@@ -170,3 +171,12 @@ def test_a_chip_without_timer_2_has_no_registers_of_it():
 
 def test_every_chip_has_flash_and_ram():
     assert all(chip.flash_bytes in (4096, 8192) and chip.iram_bytes in (128, 256) for chip in CHIPS.values())
+
+
+def test_code_beyond_the_flash_of_a_chip_is_refused(tmp_path):
+    image = tmp_path / "big.hex"
+    image.write_text(":01100000005F\n:00000001FF\n".replace("5F", "EF"))
+    with pytest.raises(
+        ImageError, match=r"0x1000 does not fit 4096 bytes; the AT89C51 has 4 KB of flash \(0x0000-0x0fff\)"
+    ):
+        load_hex(image, CHIPS["at89c51"].flash_bytes)
