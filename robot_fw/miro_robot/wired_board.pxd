@@ -4,7 +4,8 @@ from miro_robot.parts.nets cimport Nets
 
 cdef long long CYCLE_TICKS, NEVER_TICK, _BEHIND_TICKS
 cdef unsigned char _TWO_CYCLES[256]
-cdef int _ADDRESS, _RELEASE, _DATA, _STROBE, _SAMPLE, _STROBE_ENDS, _DATA_ENDS, _PAGE_ENDS, _WR, _RD
+cdef int _ADDRESS, _RELEASE, _DATA, _STROBE, _SAMPLE, _STROBE_ENDS, _DATA_ENDS, _PAGE_ENDS, _RXD, _WR, _RD
+cdef int REPLAN, STOPPED, _CONTENTION, _STARVED
 
 
 cdef class WiredBoard(EmptyBoard):
@@ -15,6 +16,7 @@ cdef class WiredBoard(EmptyBoard):
     cdef long long horizon
     cdef int pushed[4]
     cdef int on_bus
+    cdef readonly int drives_rxd
     cdef int latch_count, buffer_count
     cdef int latch_address[8]
     cdef int latch_mask[8]
@@ -31,6 +33,7 @@ cdef class WiredBoard(EmptyBoard):
     @cython.locals(due='long long', due_cycle='long long', stop_cycle='long long', reason=int, faults='long long')
     cdef int _run_pieces(self, long long until_cycle) except -1
     @cython.locals(now='long long')
+    cdef inline long long _cycle_of(self, long long due) noexcept
     cdef bint _is_due(self, long long due, long long due_cycle) except -1
     cdef bint _is_before_write(self, long long due_cycle) except -1
     cdef _step(self)
@@ -48,6 +51,8 @@ cdef class WiredBoard(EmptyBoard):
     @cython.locals(index=int, start='long long', value=int)
     cpdef int movx_read(self, int address, long long tick) except -1
     cdef int _put_address(self, int address, long long start) except -1
+    @cython.locals(changed=int)
+    cdef int _push_port(self, int port, int levels, long long tick) except -1
     @cython.locals(net=int)
     cdef _judge(self, long long tick)
     cdef _note_faults(self, long long tick)

@@ -39,7 +39,7 @@ _MOST_VALUE = (1 << 63) - 1  # of an integer, and of its negative
 # Ticks into a MOVX (1919D, timing of external data memory, nominal times): rules X1 and X2 of mcs51/README.md.
 _ADDRESS, _RELEASE, _DATA, _STROBE = 8, 10, 11, 12
 _SAMPLE, _STROBE_ENDS, _DATA_ENDS, _PAGE_ENDS = 17, 18, 19, 20
-_WR, _RD = 0x40, 0x80  # of P3
+_RXD, _WR, _RD = 0x01, 0x40, 0x80  # of P3
 _BEHIND_TICKS = 96  # more than an instruction: so far parts may be behind the CPU
 
 
@@ -52,11 +52,12 @@ class WiredBoard(EmptyBoard):
     """`parts` in the order of their names, on the nets of `netlist`. A run raises PluginError for a part that fails.
 
     `starved`: where interrupts took all of 10 ms from the main loop, which is no fault of a board.
+    `drives_rxd`: something on the board drives P3.0, so that nothing else can send to its serial port.
     """
 
     STATE = {"latched": ("8B", 0, 0xFF), "parts": [Part]}
     NOT_STATE = (
-        *("nets", "horizon", "part_index", "pushed", "starved", "on_bus"),
+        *("nets", "horizon", "part_index", "pushed", "starved", "on_bus", "drives_rxd"),
         *("latch_count", "latch_address", "latch_mask", "buffer_count", "buffer_address", "buffer_mask"),
     )
 
@@ -78,6 +79,7 @@ class WiredBoard(EmptyBoard):
         self.starved: list[FirmwareFault] = []
         wired = self.nets.wired
         self.on_bus = 1 if wired[0] or wired[2] or wired[3] & (_WR | _RD) else 0
+        self.drives_rxd = int(self.nets.is_output(self.nets.number("P3.0")))
         self._decode(spec)
         EmptyBoard.__init__(self, spec, image, stop_on_fault, stop_at, stop_at_end)
         self.cpu.main_loop_limit = spec.crystal_hz // (100 * CYCLE_TICKS)  # cycles in 10 ms
@@ -124,7 +126,10 @@ class WiredBoard(EmptyBoard):
             cpu.mark(marks)
         cpu.begin_run()
         try:
-            return self._run_pieces(until_cycle)
+            reason = self._run_pieces(until_cycle)
+            if self.drives_rxd:  # the serial port is brought up to the end of the last instruction
+                self.sync(cpu.cycles * CYCLE_TICKS - 1)
+            return reason
         finally:
             self.horizon = -1
             cpu.end_run()
@@ -137,7 +142,7 @@ class WiredBoard(EmptyBoard):
         faults = self.fault_count
         while cpu.cycles < until_cycle:
             due = self.nets.reach_tick
-            due_cycle = (due + 2) // CYCLE_TICKS  # the first whose S5P2 is not before it
+            due_cycle = self._cycle_of(due)
             self.horizon = due
             if self._is_due(due, due_cycle) or self._is_before_write(due_cycle):
                 self.sync(due)
@@ -150,6 +155,10 @@ class WiredBoard(EmptyBoard):
             if reason != 0 and (reason != REPLAN or self.again):
                 return reason
         return 0
+
+    def _cycle_of(self, due: int) -> int:
+        """The first cycle whose S5P2 is not before an event; RXD is looked at between cycles, too."""
+        return (due if self.drives_rxd else due + 2) // CYCLE_TICKS
 
     def _is_due(self, due: int, due_cycle: int) -> bool:
         """Whether an event is to be handled before the next instruction; a MOVX moves the pins of its bus before it."""
@@ -168,9 +177,14 @@ class WiredBoard(EmptyBoard):
         return self.cpu.cycles == due_cycle - 1 and _TWO_CYCLES[self.cpu.code_at(self.cpu.pc)] != 0
 
     def _step(self) -> None:
-        if self._is_before_write((self.nets.reach_tick + 2) // CYCLE_TICKS):
+        cpu = self.cpu
+        while self._is_before_write(self._cycle_of(self.nets.reach_tick)):
             self.sync(self.nets.reach_tick)
-        self.cpu.step()
+        cpu.begin_run()
+        cpu.go_on(cpu.cycles + 1)
+        if self.drives_rxd:
+            self.sync(cpu.cycles * CYCLE_TICKS - 1)
+        cpu.end_run()
 
     def sync(self, tick: int) -> None:
         """Does all that parts have to do by themselves up to and including `tick`."""
@@ -186,8 +200,7 @@ class WiredBoard(EmptyBoard):
         if nets.ports_changed:
             for port in range(4):
                 if nets.external[port] != self.pushed[port]:
-                    self.pushed[port] = nets.external[port]
-                    self.cpu.set_external(port, self.pushed[port], tick)
+                    self._push_port(port, nets.external[port], tick)
             nets.ports_changed = 0
         if nets.suspect_count and not self.forced:
             self._judge(tick)
@@ -196,6 +209,17 @@ class WiredBoard(EmptyBoard):
         if nets.reach_tick < self.horizon:
             self.horizon = nets.reach_tick
             self.cpu.replan()
+
+    def _push_port(self, port: int, levels: int, tick: int) -> None:
+        """P3.0 is the wire RXD, which the serial port reads between cycles, too."""
+        changed = self.pushed[port] ^ levels
+        self.pushed[port] = levels
+        if port == 3 and changed & _RXD and self.drives_rxd:
+            self.cpu.rxd.append(tick, levels & _RXD)
+            self.cpu.rxd_changed()
+            changed &= ~_RXD
+        if changed:
+            self.cpu.set_external(port, levels | _RXD if port == 3 else levels, tick)
 
     # From the processor
 

@@ -49,6 +49,7 @@ cdef class Chip:
     cpdef request_stop(self)
     cdef void replan(self) noexcept
     cpdef int set_external(self, int port, int levels, long long tick) except -1
+    cpdef rxd_changed(self)
     cpdef asleep(self)
     cpdef int peek_iram(self, int address) noexcept
     cdef int fault(self, int kind) except -1

@@ -266,6 +266,12 @@ class Chip:
             self.next_event = 0
             self.limit = 0
 
+    def rxd_changed(self) -> None:
+        """More is on RXD than when the run began."""
+        self.peripherals.look_again()
+        self.next_event = 0
+        self.limit = 0
+
     # Observers
 
     def asleep(self) -> bool:

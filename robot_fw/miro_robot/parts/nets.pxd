@@ -73,6 +73,7 @@ cdef class Nets:
     @cython.locals(end=int, index=int)
     cdef _connect_kin(self, netlist)
     cdef list _reaching(self, netlist)
+    cpdef bint is_output(self, int net) except -1
     cdef bint _may_contend(self, int net, netlist)
     @cython.locals(net=int, number=int, index=int, pin=int, part=Part)
     cpdef restart(self)

@@ -30,7 +30,7 @@ from miro_exact.clock import NEVER_TICK
 from miro_exact.domain import DomainError
 from miro_exact.plugins import PluginError
 from miro_exact.raised import raised
-from miro_robot.parts.keys import LOW, MOST_PINS, OPEN_DRAIN, RELEASED, STRONG, TWO_WAY
+from miro_robot.parts.keys import IN, LOW, MOST_PINS, OPEN_DRAIN, RELEASED, STRONG, TWO_WAY
 from miro_robot.parts.netlist import MOST_PARTS, PORT_PINS, Netlist
 from miro_robot.parts.part import Part
 
@@ -233,6 +233,15 @@ class Nets:
             reaching += more
             nets.update(place.net for index in more for place in netlist.parts[index] if place.net >= 0)
         return reaching
+
+    def is_output(self, net: int) -> bool:
+        """Whether something else than a port can drive a net."""
+        kinds = [
+            self.parts[self.pin_part[place]].keys.PINS[self.pin_number[place]].kind
+            for place in range(self.first[net], self.first[net + 1])
+        ]
+        tied = (*self.netlist.highs, *self.netlist.lows, *self.netlist.pull_downs, *self.latch_nets)
+        return net in tied or kinds.count(IN) < len(kinds)
 
     def _may_contend(self, net: int, netlist: Netlist) -> bool:
         """Whether a strong high and a strong low may meet on a net: then the CPU has to be there when they do."""

@@ -268,7 +268,7 @@ class Terminal:
     """
 
     STATE = {"input": SerialInput, "pins": PinInput, "next_feed": TICK}
-    NOT_STATE = ("board",)
+    NOT_STATE = ("board", "may_send")
 
     def __init__(self, spec: TerminalSpec, board: EmptyBoard) -> None:
         self.board = board
@@ -278,6 +278,7 @@ class Terminal:
         self.pins = PinInput(board.cpu, spec.pins)
         if self.pins.uses_rxd and (spec.live or self.input.pieces):
             raise ValueError("P3.0 is RXD and cannot be a pin while serial input is sent there")
+        self.may_send = bool(spec.live or self.input.pieces or self.pins.uses_rxd)
         self.next_feed = 0
         board.listening = self._listening
         board.input_tick = self.pins.next_tick

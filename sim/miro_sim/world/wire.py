@@ -149,6 +149,8 @@ class Wire(Medium):
             raise ValueError(f"net{index}: how long a bit of the script is must be given (bit_ticks)")
         if self.terminal is not None and script:
             raise ValueError(f"net{index}: a terminal sends; no script can")
+        if sending or (self.terminal is not None and self.terminal.may_send):
+            self._check_rxd_is_free()
         for sent in sending or ():
             check_bad_stop(sent.bad_stop, len(sent.data))
             self.outbox.inject(sent, 0)
@@ -169,12 +171,19 @@ class Wire(Medium):
         """See `World.inject`."""
         if self.terminal is not None:
             raise ValueError(f"net{self.index}: a terminal sends; nothing else can")
+        self._check_rxd_is_free()
         if not self.bit_ticks:
             self.bit_ticks = self.board.cpu.peripherals.bit_ticks()
             self.outbox.character_ticks = CHARACTER_BITS * self.bit_ticks
         if not self.bit_ticks:
             raise ValueError(f"net{self.index}: the receiver is off, and no bit_ticks are given")
         return Medium.inject(self, data, at_tick, now, bad_stop)
+
+    def _check_rxd_is_free(self) -> None:
+        """Raises ValueError if something on the board drives RXD."""
+        if isinstance(self.board, WiredBoard) and self.board.drives_rxd:
+            drives = "something on the board drives P3.0 (RXD), so nothing can be sent to its serial port"
+            raise ValueError(f"net{self.index}: {drives}; wire it to another pin")
 
     def send(self, sent: Transmission) -> None:
         """Start bit, eight data bits, stop bit; a bad one is space for three quarters of a bit."""
@@ -242,6 +251,8 @@ class Wire(Medium):
 
     def check_times(self, earliest_tick: int, tick: int) -> None:
         Medium.check_times(self, earliest_tick, tick)
+        if isinstance(self.board, WiredBoard) and self.board.drives_rxd:
+            return
         rxd = self.board.cpu.rxd
         settled_tick = rxd.settled_tick
         if self.terminal is None and settled_tick != tick + SETTLE_TICKS and tick:

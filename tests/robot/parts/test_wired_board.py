@@ -433,3 +433,71 @@ def test_a_led_follows_its_pin():
     board = board_of("CLR P2.0\nNOP\nSETB P2.0\nCLR P2.0\nSJMP $", netlist, [led])
     board.run(120)
     assert (board.value("lamp", "on"), board.value("lamp", "flashes")) == (1, 2)
+
+
+# RXD
+
+RECEIVE = """
+LJMP main
+ORG 23h
+CLR RI
+MOV A,SBUF
+MOVX @DPTR,A
+INC DPTR
+CLR TI
+RETI
+ORG 40h
+main:
+MOV TMOD,#21h
+MOV TH1,#0FDh
+MOV TL1,#0FDh
+MOV SCON,#50h
+MOV PCON,#80h
+SETB TR1
+MOV IE,#90h
+loop:
+MUL AB
+JB P3.0,loop
+INC 30h
+MOV A,SCON
+ADD A,31h
+MOV 31h,A
+SJMP loop
+"""
+BIT_TICKS = 12 * 16 * 3
+
+
+def sent(data, tick, bit_ticks):
+    """Edges of RXD for some characters."""
+    level = 1
+    for value in data:
+        for bit in (0, *(value >> number & 1 for number in range(8)), 1):
+            if bit != level:
+                yield tick, 3, 0, bit
+            level = bit
+            tick += bit_ticks
+
+
+@given(
+    st.binary(min_size=1, max_size=6),
+    st.integers(1, 30_000),
+    st.integers(-12, 12),
+    st.lists(st.integers(1, 50_000)),
+)
+def test_a_part_on_rxd_is_heard_as_a_file_of_pins_is(data, tick, faster, pieces):
+    edges = list(sent(data, tick, BIT_TICKS + faster))
+    bare = Alone(image_of(RECEIVE), pins=tuple(PinEvent(*edge) for edge in edges))
+    bare.board.stop_at_end = False
+    bare.world.run_to(100_000)
+    part = scripted("a", [(at, D, RELEASED if level else LOW) for at, _, _, level in edges])
+    board = board_of(RECEIVE, wired({(P3, 0): "rxd"}, [{D: "rxd"}]), [part])
+    board.cpu.rxd.settled_tick = bare.cpu.rxd.settled_tick
+    for until in [*sorted(pieces), 100_000]:
+        board.run(until)
+    assert snapshot(board.cpu) == snapshot(bare.cpu)
+    assert board.xram() == bare.board.xram()
+    assert board.drives_rxd
+
+
+def test_a_part_that_only_listens_at_p3_0_leaves_rxd_to_the_terminal():
+    assert not board_of(netlist=wired({(P3, 0): "n"}, [{A: "n"}]), parts=[scripted("a")]).drives_rxd

@@ -336,3 +336,25 @@ def test_both_engines_give_the_same_bits():
     )
     assert compiled
     assert compiled == python
+
+
+# --------------------------------------------------------------------------------------------- RXD
+
+KEY_ON_RXD = BoardSpec(parts={"key": PartSpec(keys=Button(), pins={"pin": "P3.0"})})
+
+
+def test_a_key_on_rxd_is_polled_and_saved():
+    world, other = (
+        wired_world(text="loop:\nMOV C,P3.0\nMOV P1.7,C\nSJMP loop", board=KEY_ON_RXD) for _ in range(2)
+    )
+    world.do(put(1_000, "key.pressed", True))
+    world.run_to(5_000_000)
+    assert not world.device().board.cpu.sfr(0x90) & 0x80
+    other.state.load(world.state.save())
+    assert other.state.save() == world.state.save()
+
+
+def test_nothing_can_be_sent_to_a_board_that_drives_rxd():
+    world = wired_world(board=KEY_ON_RXD, bit_ticks=2_500)
+    with pytest.raises(ValueError, match=r"something on the board drives P3\.0 \(RXD\)"):
+        world.inject(b"x")
