@@ -11,6 +11,7 @@ The command line may bring one in a file, `FILE.py:CLASS`. Files that strangers 
 """
 
 import importlib.util
+import sys
 from collections.abc import Iterable, Mapping
 from importlib import import_module
 from pathlib import Path
@@ -129,13 +130,19 @@ def installed_part(group: str, word: str, name: str, own: str = "") -> Any:
 
 
 def module_of(path: str, option: str) -> ModuleType:
-    """Runs a file that `option` of the command line names. Raises BadInput."""
+    """Runs a file that `option` of the command line names. Raises BadInput.
+
+    Who resolves the file's annotations looks for its module by name: it stays among the modules, under its path where
+    another one has the file's name.
+    """
     if not Path(path).is_file():
         raise BadInput(path, option, "there is no such file", "give the path of a file in Python")
-    spec = importlib.util.spec_from_file_location(Path(path).stem, path)
+    stem = Path(path).stem
+    spec = importlib.util.spec_from_file_location(path if stem in sys.modules else stem, path)
     assert spec is not None
     assert spec.loader is not None
     module = importlib.util.module_from_spec(spec)
+    sys.modules[spec.name] = module
     try:
         spec.loader.exec_module(module)
     except (Exception, SystemExit) as error:

@@ -1,5 +1,7 @@
 """A board file gives the board that it describes, or one line with file, place, what is wrong and the remedy."""
 
+import json
+import sys
 import tomllib
 from contextlib import suppress
 
@@ -267,6 +269,20 @@ def test_a_part_of_the_command_line_is_found_until_the_option_is_read_again(tmp_
     finally:
         bring_parts([])
     assert "'sonar' is not one of the choices" in line(text)
+
+
+@pytest.mark.parametrize("name", ["ranger", "json"])
+def test_annotations_of_a_file_in_python_may_wait_until_they_are_needed(tmp_path, name):
+    path = tmp_path / f"{name}.py"
+    head = "from __future__ import annotations\nfrom typing import Annotated\nfrom msgspec import Meta\n"
+    path.write_text(head + SONAR.replace("cm: float", "cm: Annotated[float, Meta(le=9)]"))
+    bring_parts([f"{path}:Sonar"])
+    try:
+        message = line(HEAD + '[parts.eye]\npart = "sonar"\ncm = 10\npins = { echo = "P1.0" }\n')
+        assert message.startswith("parts.eye.cm: 10 is out of range; must be <= 9.0")
+    finally:
+        bring_parts([])
+    assert sys.modules["json"] is json
 
 
 @pytest.mark.parametrize(
