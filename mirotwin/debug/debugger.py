@@ -267,7 +267,8 @@ class Debugger:
         """On to an event; what it says of itself."""
         event = self.timeline.until(condition)
         if event is not None:
-            return str(event)
+            tick, place, what = str(event).split(": ", 2)
+            return f"{tick}: {what}" if self.timeline.core.robot is None else f"{tick}: {place}: {what}"
         return "no such event before the end" if self.timeline.run.over else INTERRUPTED
 
     def until_true(self, text: str) -> str:

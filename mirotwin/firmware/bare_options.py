@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import re
 import sys
-from collections.abc import Callable
+from collections.abc import Callable, Iterable
 from enum import StrEnum
 from typing import Annotated
 
@@ -14,6 +14,7 @@ from miro_exact.bad_input import BadInput, amount
 from miro_exact.inputs import TEXT_BYTES, read_input
 from miro_robot.board_spec import CRYSTAL_HZ, BoardSpec
 from miro_robot.empty_board import EmptyBoard
+from miro_robot.faults import FirmwareFault
 from miro_robot.image import FLASH_BYTES, SPACE_BYTES, Image
 from miro_sim.scenario.board import BoardScenario
 from miro_sim.scenario.board_file import load_board
@@ -288,14 +289,24 @@ def _start(image: Image, options: BareOptions) -> int:
     return start
 
 
+def _alike(faults: Iterable[FirmwareFault]) -> list[list[FirmwareFault]]:
+    """Those of one kind at one instruction together: a loop has thousands."""
+    places: dict[tuple[int, int, str], list[FirmwareFault]] = {}
+    for fault in faults:
+        places.setdefault((fault.kind, fault.pc, fault.detail), []).append(fault)
+    return list(places.values())
+
+
 def report(world: World, options: BareOptions) -> int:
     """Says on stderr why a run ended that did not end as planned; returns the exit code."""
     board, serial, why = board_of(world), terminal_of(world).input, ended(world, options.max_cycles)
     verdict = "passed"
-    for fault in board.faults[:FAULTS_LISTED]:
-        complain(f"firmware fault: {fault}")
-    if board.fault_count > FAULTS_LISTED:
-        complain(f"firmware faults: {board.fault_count - FAULTS_LISTED} more are not listed")
+    left = board.fault_count
+    for alike in _alike(board.faults)[:FAULTS_LISTED]:
+        complain(f"firmware fault: {alike[0]}{f' (and {len(alike) - 1} like it)' if alike[1:] else ''}")
+        left -= len(alike)
+    if left:
+        complain(f"firmware faults: {left} more are not listed")
     if why is Ended.CYCLES:
         complain(f"stopped at the limit, at {stopped_at(world)}")
         verdict = "limit"

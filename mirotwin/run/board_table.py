@@ -11,6 +11,9 @@ from mirotwin.runs.board_summary import BoardSummary, SerialCounts
 from mirotwin.runs.result import expectations_text
 from mirotwin.shell.console import facts_table
 
+LONGEST_TEXT = 100
+"""Of a value in the table: rows of a display are shorter."""
+
 
 def board_table(summary: BoardSummary, serial: SerialCounts, image: str, folder: Path) -> Table:
     firmware, table = summary.firmware, facts_table()
@@ -57,12 +60,18 @@ def _by_part(summary: BoardSummary) -> dict[str, list[str]]:
     parts: dict[str, list[str]] = {}
     for path, value in summary.parts.items():
         part, _, key = path.partition(".")
-        text = (
-            f"{value:.6g}"
-            if isinstance(value, float)
-            else f"{value!r}"
-            if isinstance(value, str)
-            else f"{value}"
-        )
-        parts.setdefault(part, []).append(f"{key} {text}")
+        parts.setdefault(part, []).append(f"{key} {_shown(value)}")
     return parts
+
+
+def _shown(value: float | int | bool | str) -> str:
+    """A value for people; of a long text, such as what a memory holds, the beginning."""
+    if isinstance(value, float):
+        return f"{value:.6g}"
+    if not isinstance(value, str):
+        return f"{value}"
+    return (
+        f"{value!r}"
+        if len(value) <= LONGEST_TEXT
+        else f"{value[:LONGEST_TEXT]!r}.. ({len(value)} characters)"
+    )

@@ -98,7 +98,9 @@ def fault_lines(devices: Sequence[Device], to_tick: int = NEVER_TICK) -> Iterato
     for device in devices:
         faults = [fault for fault in device.board.faults if fault.tick <= to_tick]
         if faults:
-            more = f" (and {len(faults) - 1} more)" if len(faults) > 1 else ""
+            # the board keeps the first ones only
+            count = device.board.fault_count if len(faults) == len(device.board.faults) else len(faults)
+            more = f" (and {count - 1} more)" if count > 1 else ""
             place = f"net{device.network}/robot{device.slot}: " if isinstance(device, Robot) else ""
             yield "fault", f"firmware fault: {place}{faults[0]}{more}"
 

@@ -299,7 +299,9 @@ class WiredBoard(EmptyBoard):
     def _judge(self, tick: int) -> None:
         """Contention is a fault where it begins. RST and the supply move pins one after the other: judged after."""
         for net in self.nets.judge():
-            detail = f"net {self.nets.names[net]}: {' and '.join(self.nets.drivers(net))}"
+            detail = ""
+            if len(self.faults) < FAULTS_KEPT:  # of the others nobody sees it
+                detail = f"net {self.nets.names[net]}: {' and '.join(self.nets.drivers(net))}"
             self._note_fault(_CONTENTION, self.cpu.at, tick, detail)
 
     def _note_faults(self, tick: int) -> None:

@@ -1,5 +1,7 @@
 """Parts and nets of a board in the debugger: printed, waited for, and as they were where it goes back."""
 
+import re
+
 import pytest
 
 from miro_exact.bad_input import BadInput
@@ -61,6 +63,10 @@ def test_until_stops_before_the_first_instruction_at_which_it_is_true_and_going_
     assert console.timeline.tick == tick
     assert "lamp.on is true here" in said(console, "until lamp.on")
     assert "lamp.flashes > 1 is not true before the end" in said(console, "until lamp.flashes > 1")
+
+
+def test_an_event_is_told_without_the_place_which_a_board_alone_does_not_have(console):
+    assert re.search(r"  tick \d+: edge P1\.0 to 0: 0x", said(console, "until edge pin=P1.0 level=0"))
 
 
 def test_a_breakpoint_may_ask_for_parts(console):

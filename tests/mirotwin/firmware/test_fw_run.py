@@ -139,12 +139,22 @@ def test_a_dump_that_does_not_fit_the_disk_leaves_the_one_before(tmp_path):
     assert sorted(path.name for path in tmp_path.iterdir()) == ["a.ihx", "dump.json"]
 
 
-def test_a_run_goes_on_after_faults_and_counts_those_that_are_not_listed(mirotwin, tmp_path):
+def test_a_run_goes_on_after_faults_and_lists_a_hundred_places(mirotwin, tmp_path):
+    image = hex_file(tmp_path / "a.ihx", 110 * b"\xa5" + b"\x80\x90")
+    err = mirotwin.ends(3, "fw", "run", image, "--go-on", "--max-cycles", 112)
+    assert err.count("firmware fault: firmware executed the undefined opcode A5 at 0x00") == 100
+    assert "mirotwin: firmware faults: 10 more are not listed\n" in err
+    assert err.endswith("mirotwin: stopped at the limit, at 0x0000 after 112 machine cycles\n")
+
+
+def test_faults_of_a_loop_are_one_line_with_their_number(mirotwin, tmp_path):
     image = hex_file(tmp_path / "a.ihx", b"\xa5\x80\xfd")
     err = mirotwin.ends(3, "fw", "run", image, "--go-on", "--max-cycles", 330)
-    assert err.count("firmware fault: firmware executed the undefined opcode A5 at 0x0000, tick ") == 100
-    assert "mirotwin: firmware faults: 10 more are not listed\n" in err
-    assert err.endswith("mirotwin: stopped at the limit, at 0x0000 after 330 machine cycles\n")
+    (line,) = [line for line in err.splitlines() if "fault" in line]
+    assert line.endswith("executed the undefined opcode A5 at 0x0000, tick 12 (and 109 like it)")
+    err = mirotwin.ends(3, "fw", "run", image, "--go-on", "--max-cycles", 3300)
+    assert "tick 12 (and 999 like it)\n" in err
+    assert "firmware faults: 100 more are not listed\n" in err
 
 
 def test_a_time_is_one_of_the_crystal(mirotwin, tmp_path):

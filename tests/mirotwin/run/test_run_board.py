@@ -6,9 +6,17 @@ import pytest
 
 from miro_robot.firmware import image_path
 from mirotwin.recording.reader import read
-from tests.mirotwin.board_files import board_folder
+from tests.mirotwin.board_files import SCENARIO, board_folder
 
 PERIOD_S = 2_400_000 / 11_059_200
+ROM = """
+chip = "stc89c52"
+crystal_hz = 11_059_200
+pull_ups = ["P1"]
+[parts.rom]
+part = "at24c"
+pins = { scl = "P1.5", sda = "P1.6" }
+"""
 
 
 @pytest.fixture(scope="module")
@@ -61,6 +69,15 @@ def test_the_table_names_what_matters(mirotwin, scenario, tmp_path):
         assert word in out
 
 
+def test_of_a_long_value_the_table_shows_the_beginning(mirotwin, scenario, tmp_path):
+    board = tmp_path / "rom.board.toml"
+    board.write_text(ROM)
+    image = scenario.with_name("lamp.hex")
+    out = mirotwin.succeeds("run", board, "--firmware", image, "--for", "1ms", "--out", tmp_path / "out")
+    shown = "".join(out.split())
+    assert f"content'{'ff' * 50}'..(512characters)" in shown
+
+
 def test_a_board_file_is_run_with_an_image_for_a_time(mirotwin, scenario, tmp_path):
     board, image = scenario.with_name("lamp.board.toml"), scenario.with_name("lamp.hex")
     for time in ("200ms", "2211840t"):
@@ -93,6 +110,15 @@ def test_a_fault_ends_the_run_with_its_own_code(mirotwin, tmp_path):
     line = mirotwin.ends(3, "run", path, "--out", tmp_path / "out", "-q")
     assert "firmware fault: firmware executed the undefined opcode A5 at 0x0004" in line
     assert "/fault" in str((tmp_path / "out" / "run.mcap").read_bytes())
+
+
+def test_faults_are_counted_also_where_the_board_no_longer_keeps_them(mirotwin, tmp_path):
+    text = SCENARIO.replace("duration_s = 0.5", "duration_s = 0.005\nstop_on_fault = false")
+    path = board_folder(tmp_path, text, program="again:\nDB 0A5h\nSJMP again")
+    line = mirotwin.ends(3, "run", path, "--out", tmp_path / "out", "-q")
+    summary = json.loads((tmp_path / "out" / "summary.json").read_bytes())
+    assert summary["firmware"]["faults"] > 1000
+    assert f"(and {summary['firmware']['faults'] - 1} more)" in line
 
 
 CLOCK = """
