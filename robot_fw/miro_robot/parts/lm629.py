@@ -60,7 +60,7 @@ class Lm629Keys(PartKeys, frozen=True, kw_only=True, tag="lm629"):
 
     def make(self, place: Place) -> Part:
         if place.crystal_hz != CRYSTAL_HZ:
-            reason = f"part {place.name!r} (lm629): its 6 MHz are a quarter of the board's crystal"
+            reason = f"part {place.name!r} (lm629): its time is counted in ticks of 24 MHz"
             raise PluginError(reason, f"set crystal_hz = {CRYSTAL_HZ}")
         return Lm629Part(self, place)
 
@@ -130,6 +130,11 @@ class Lm629Part(Part):
         chip, levels = self.chip, self.levels
         data = self._data()
         cs, rd, wr, ps = levels >> _CS & 1, levels >> _RD & 1, levels >> _WR & 1, levels >> _PS & 1
+        if chip.port.reading and levels & _STROBES != _READS:
+            # A MOVX takes what it reads a tick before /RD rises; after port pins that is never too early.
+            broken = self.timing.sampled(tick - 1)
+            if broken:
+                self.fault(_TIMING, LIMITS[broken].breach(self.timing.ticks), -1)
         broken = self.timing.pins(tick, cs, rd, wr, ps, data)
         if broken:
             self.fault(_TIMING, LIMITS[broken].breach(self.timing.ticks), 0)
