@@ -5,6 +5,7 @@ What it prints of a moment is a time that `goto` takes, why it stopped, the plac
 
 from __future__ import annotations
 
+import json
 import re
 import shlex
 import signal
@@ -273,7 +274,9 @@ def _lines_of(name: str, value: Value) -> Iterator[str]:
     """A value as text: groups a line a member."""
     if value.members is None:
         note = f"   ({value.note})" if value.note else ""
-        yield f"{name} = {shown_value(content(value))}{note}"
+        shown = content(value)
+        text = json.dumps(shown, ensure_ascii=False) if isinstance(shown, str) else shown_value(shown)
+        yield f"{name} = {text}{note}"
     else:
         for part, get in children(value):
             yield from _lines_of(f"{name}.{part}", get())

@@ -46,8 +46,9 @@ class DebugOptions(DebugSubject, frozen=True, kw_only=True):
 def debug(options: DebugOptions) -> int:
     """Steps through the firmware of SUBJECT, forwards and backwards.
 
-    SUBJECT is a scenario, an image (on the bare processor), a recording, a stream file, or a case, which stands at its
-    failed check. `help` lists the commands. With --dap or --listen an editor says what is debugged.
+    SUBJECT is a scenario, an image (on the bare processor, or on --board), a board file with --firmware, a recording, a
+    stream file, or a case, which stands at its failed check. `help` lists the commands. With --dap or --listen an
+    editor says what is debugged.
     """
     if options.listen is not None:
         return _listen(options.listen)

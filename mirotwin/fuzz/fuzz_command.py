@@ -123,7 +123,10 @@ class FuzzOptions(Options, frozen=True, kw_only=True):
     quiet: Annotated[bool, QUIET.saying("No progress, and of the results only what failed.")] = False
     bare: Annotated[
         bool,
-        Option(help="Fuzz IMAGE.ihx on a bare processor: nothing of the robot is connected.", heading=BARE),
+        Option(
+            help="Fuzz IMAGE.ihx on a bare processor: nothing is on the board.",
+            heading=BARE,
+        ),
     ] = False
     crystal: Annotated[
         int | None, CRYSTAL.saying("Its crystal. Default 24000000.", heading=BARE, needs="bare")

@@ -55,6 +55,9 @@ def value(text, scope=None):
         ("'A' + '\\n'", 75),
         ("a.0 + a.3", 1),
         ("a * 1.5", 10.5),
+        ('"READY" == "READY"', 1),
+        ('"a\\nb" != "a"', 1),
+        ('"a: \\"b\\"" == "a: b"', 0),
     ],
 )
 def test_operators_have_the_ranks_of_c(text, expected):
