@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from typing import Any
 
+from miro_exact.clock import CYCLE_TICKS
 from miro_robot.parts.resolve import resolve
 from miro_robot.parts.values import checked_read
 from miro_sim.scenario.board import BoardScenario
@@ -51,7 +52,7 @@ class Following:
         elif isinstance(condition, OfPin):
             self.place = self.changes.find(condition.pin)
         elif isinstance(condition, Value):
-            now = subject.cpu.cycles * 12
+            now = subject.cpu.cycles * CYCLE_TICKS
             value = self.changes.watch_value(condition.of, now)
             self.serial = self.changes.values.end
             self.follower = condition.follower(condition.of, 0, self.clock, now, value)

@@ -4,7 +4,9 @@ from functools import cache
 from pathlib import Path
 from tempfile import TemporaryDirectory
 
+from miro_protocol.toml_text import tables
 from miro_robot.image import load_hex
+from miro_sim.scenario.board_file import board_of_table
 from tests.robot.inspect.programs import build
 
 BOARD = """
@@ -23,6 +25,12 @@ PROGRAM = (Path(__file__).parent / "panel.c").read_text()
 DEAF = PROGRAM.replace("if (RI)", "if (0)")
 SLOW = PROGRAM.replace("if (++phase == 10)", "if (++phase == 20)")
 STARVES = PROGRAM.replace("ticks++;", "ticks++; if (counts) for (;;) ;")
+
+
+@cache
+def panel():
+    """The board."""
+    return board_of_table(tables(BOARD), "panel.board.toml")
 
 
 @cache

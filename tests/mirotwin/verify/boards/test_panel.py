@@ -3,16 +3,24 @@
 import re
 
 import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+from msgspec.structs import replace
 
+from miro_exact.bad_input import BadInput
 from miro_exact.clock import ms
+from miro_sim.scenario.board import BoardScenario
 from miro_sim.scenario.board_scenario import load_any
+from miro_sim.world.conditions import CONDITIONS
 from mirotwin.runs.run import Run
 from mirotwin.runs.spec import RunSpec
 from mirotwin.runs.test_file import run_test
 from mirotwin.testing.test_files import run_file
 from mirotwin.testing.test_options import TestOptions
-from mirotwin.verify.steps.reading import steps_in
-from tests.mirotwin.verify.boards.panel import DEAF, PROGRAM, SLOW, STARVES, built, project
+from mirotwin.verify.checks.expect import expectations_of
+from mirotwin.verify.steps.keys import VERBS
+from mirotwin.verify.steps.reading import steps_in, steps_of
+from tests.mirotwin.verify.boards.panel import DEAF, PROGRAM, SLOW, STARVES, built, panel, project
 from tests.mirotwin.verify.steps.rig import scenario_of
 from tests.mutants.sdcc import needs_sdcc
 
@@ -67,8 +75,6 @@ def test_a_run_with_steps_is_the_run_in_which_a_script_does_the_same(tmp_path):
     steps.drive()
     steps.finish()
     assert steps.trace is not None
-    from msgspec.structs import replace
-
     scenario = replace(text.scenario, step=(), bit_ticks=steps.world.lines[0].bit_ticks)
     script = Run(RunSpec(scenario=scenario, image=image, script=steps.trace.script()))
     script.drive()
@@ -253,7 +259,6 @@ def test_what_is_wrong_with_a_step_is_one_line_with_its_place(steps, tmp_path):
 )
 def test_robots_have_no_parts(step):
     from miro_sim.scenario.errors import ScenarioError
-    from mirotwin.verify.steps.reading import steps_of
 
     with pytest.raises(ScenarioError, match="is for a board"):
         steps_of(scenario_of(step), "mine")
@@ -266,3 +271,51 @@ def test_milliseconds_are_ticks_of_the_boards_crystal_rounded(tmp_path):
     tick = ms(0.05, CRYSTAL_HZ) + ms(3.3, CRYSTAL_HZ)
     assert (ms(0.05, CRYSTAL_HZ), tick) == (553, 553 + 36_495)
     assert f"tick {tick} ({tick / 11059.2:.3f} ms)" in result.lines[0]
+
+
+WORDS = st.sampled_from(
+    ["edge", "level", "pulse", "frequency", "duty", "text", "value", "P2.0", "BLINK", "key", "lamp.on"]
+)
+VALUES = st.one_of(
+    WORDS,
+    st.text(max_size=8),
+    st.integers(-(1 << 70), 1 << 70),
+    st.floats(),
+    st.booleans(),
+    st.lists(st.integers(), max_size=2),
+    st.dictionaries(
+        st.sampled_from(["key", "lamp", ""]), st.dictionaries(st.text(max_size=7), st.booleans()), max_size=2
+    ),
+)
+CONDITION_KEYS = sorted({key for kind in CONDITIONS.values() for key in kind.__struct_encode_fields__})
+KEYS = st.sampled_from([*VERBS, *CONDITION_KEYS, "hex", "gap_ms", "for_ms", "within_ms", "from_now", "note"])
+
+
+def refused(read):
+    """The message of a refusal, or the empty string."""
+    try:
+        read()
+    except BadInput as error:
+        return str(error)
+    return ""
+
+
+@settings(max_examples=300)
+@given(st.dictionaries(KEYS, VALUES, min_size=1, max_size=5))
+def test_whatever_a_step_says_it_is_read_or_refused_in_one_line(table):
+    scenario = BoardScenario(board=panel(), duration_ticks=CRYSTAL_HZ, step=(table,))
+    message = refused(lambda: steps_of(scenario, "mine"))
+    assert message.startswith("mine: step 1") or not message
+    assert "\n" not in message
+
+
+@settings(max_examples=200)
+@given(
+    st.sampled_from(
+        ["pwm_at_least_hz", "one_driver", "sends_text", "value_at_most", "value_at_least", "happens"]
+    ),
+    st.one_of(VALUES, st.dictionaries(st.one_of(KEYS, WORDS), VALUES, max_size=3)),
+)
+def test_whatever_a_board_is_expected_to_do_it_is_read_or_refused_in_one_line(check, value):
+    scenario = BoardScenario(board=panel(), duration_ticks=CRYSTAL_HZ, expect={check: value})
+    assert "\n" not in refused(lambda: expectations_of(scenario, "mine"))
