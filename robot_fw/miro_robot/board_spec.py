@@ -57,6 +57,7 @@ class BoardSpec(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_only
     RAM of 64 KB. `start`: address of the first instruction, as after a jump there by a monitor. `bound_stack`: SP that
     leaves the stack of the image is a fault. `check_strobes`: a MOVX while P3.6 or P3.7 holds its strobe is one.
     `nets`: a name for the net of a port pin, or of several. `pull_ups`, `pull_downs`: nets, port pins, whole ports.
+    `allow_contention`: the same, on which outputs of different level are no fault; the low one wins.
     `baud`: of what a terminal sends; 0: the receiver's own rate.
     All tables are in the order of the names, so that the order of a file changes no bit.
     Raises ValueError for values out of range.
@@ -73,6 +74,7 @@ class BoardSpec(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_only
     check_strobes: bool = False
     pull_ups: tuple[str, ...] = ()
     pull_downs: tuple[str, ...] = ()
+    allow_contention: tuple[str, ...] = ()
     nets: dict[str, tuple[str, ...]] = {}
     straps: dict[str, StrapSpec] = {}
     latches: dict[str, LatchSpec] = {}

@@ -36,6 +36,7 @@ xram = "external"
 xram_bytes = 0x4000
 pull_ups = ["P0", "SDA"]
 pull_downs = ["P2.0"]
+allow_contention = ["P0"]
 [nets]
 SDA = "P2.1"
 START = ["P3.2", "P1.7"]
@@ -143,6 +144,7 @@ def test_a_file_is_read_as_it_says():
         check_strobes=True,
         pull_ups=("P0", "SDA"),
         pull_downs=("P2.0",),
+        allow_contention=("P0",),
         nets={"SDA": ("P2.1",), "START": ("P3.2", "P1.7")},
         straps={"mode": StrapSpec(pin="P3.4", level=0)},
         latches={"CTRL": LatchSpec(address=0x8000, mask=0xC000, initial=15)},

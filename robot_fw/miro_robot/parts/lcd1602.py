@@ -14,6 +14,9 @@ A byte that is written while it is busy is lost and counted in `lost`; its halve
 breaks the bus timing is counted in `short_pulses` and taken all the same; of signals that change on the tick on which E
 falls, what they were before. From a processor of 12 ticks a cycle E is never too short below 52 MHz: what is left is
 RS, R/W or data that are written by the same instruction as E.
+
+A program that reads the busy flag while its port still drives data low works against the display's outputs: contention,
+a fault. They source 0.2 mA (DC characteristics), so the port wins; `allow_contention = ["P0"]` lets it be.
 """
 
 from __future__ import annotations

@@ -21,6 +21,7 @@ class Netlist(msgspec.Struct, frozen=True, kw_only=True):
 
     `ports`: by port pin (8 * port + bit), its net, -1 if nothing else is there. `parts`: by part, in the order of their
     names, and pin. `pull_ups`, `pull_downs`: nets with a resistor; `highs`, `lows`: tied to VCC, to ground.
+    `allow_contention`: nets on which it is no fault.
     `latches`: by output latch of MOVX and bit; `buffers`: by input buffer and bit; -1 where nothing is connected.
     """
 
@@ -29,6 +30,7 @@ class Netlist(msgspec.Struct, frozen=True, kw_only=True):
     parts: tuple[tuple[PartPin, ...], ...] = ()
     pull_ups: tuple[int, ...] = ()
     pull_downs: tuple[int, ...] = ()
+    allow_contention: tuple[int, ...] = ()
     highs: tuple[int, ...] = ()
     lows: tuple[int, ...] = ()
     latches: tuple[tuple[int, ...], ...] = ()

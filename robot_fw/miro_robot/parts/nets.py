@@ -618,13 +618,13 @@ class Nets:
         self.waiting_count += 1
 
     def judge(self) -> list[int]:
-        """The nets on which contention has begun, once the tick is settled."""
+        """The nets on which contention that is a fault has begun, once the tick is settled."""
         begun = []
         for place in range(self.suspect_count):
             net = self.suspects[place]
             self.is_suspect[net] = 0
             both = 1 if self.lows[net] and self.highs[net] else 0
-            if both and not self.contended[net]:
+            if both and not self.contended[net] and net not in self.netlist.allow_contention:
                 begun.append(net)
             self.contended[net] = both
         self.suspect_count = 0

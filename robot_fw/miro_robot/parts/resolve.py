@@ -50,6 +50,7 @@ class _Wire(msgspec.Struct):
     place: str = ""
     pulled_up: bool = False
     pulled_down: bool = False
+    may_contend: bool = False
     strap: str = ""
     level: int = -1
 
@@ -146,6 +147,7 @@ class _Resolver:
             self.strap(name, strap.pin, strap.level)
         self.pull(spec.pull_downs, "pull_downs")
         self.pull(spec.pull_ups, "pull_ups")
+        self.allow_contention(spec.allow_contention)
 
     def check_pins(self, name: str, part: PartSpec) -> None:
         """That every pin that needs it is connected, and no other is named."""
@@ -263,21 +265,27 @@ class _Resolver:
 
     def pull(self, names: tuple[str, ...], key: str) -> None:
         for index, name in enumerate(names):
-            for net in self.pulled(name, f"{key}[{index}]"):
+            for net in self.listed(name, f"{key}[{index}]"):
                 if key == "pull_downs":
                     self.wire(net, f"{key}[{index}]").pulled_down = True
                 elif net in self.wires:  # else it does nothing
                     self.wires[net].pulled_up = True
 
-    def pulled(self, name: str, place: str) -> Iterator[str]:
-        """The nets of a resistor, or of one for each pin of a port."""
+    def allow_contention(self, names: tuple[str, ...]) -> None:
+        for index, name in enumerate(names):
+            for net in self.listed(name, f"allow_contention[{index}]"):
+                if net in self.wires:  # else it does nothing
+                    self.wires[net].may_contend = True
+
+    def listed(self, name: str, place: str) -> Iterator[str]:
+        """A net of a list, or one for each pin of a port."""
         if re.fullmatch(r"P[0-3]", name):
             for bit in range(8):
                 yield self.named.get(f"{name}.{bit}", f"{name}.{bit}")
             return
         net, inverted = self.target(name, place)
         if inverted or net in (GROUND, VCC):
-            raise BoardError("", place, f"{name!r} has no resistor", "give a net, a port pin or a port")
+            raise BoardError("", place, f"{name!r} is no net by itself", "give a net, a port pin or a port")
         if net not in self.wires and not _PORT_PIN.fullmatch(net):
             remedy = did_you_mean(name, self.wires, "nothing is wired to it")
             raise BoardError("", place, f"there is no net {name!r}", remedy)
@@ -365,6 +373,7 @@ class _Resolver:
             ),
             pull_ups=tuple(net for net, wire in nets if wire.pulled_up),
             pull_downs=tuple(net for net, wire in nets if wire.pulled_down),
+            allow_contention=tuple(net for net, wire in nets if wire.may_contend),
             highs=tuple(net for net, wire in nets if wire.level == 1 or names[net] == VCC),
             lows=tuple(net for net, wire in nets if wire.level == 0 or names[net] == GROUND),
             latches=tuple(tuple(latches[name, bit] for bit in range(8)) for name in self.spec.latches),

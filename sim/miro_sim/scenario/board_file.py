@@ -62,6 +62,7 @@ class _File(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_only=Tru
     xram_bytes: Annotated[int, Meta(ge=1, le=XRAM_BYTES)] | None = None
     pull_ups: tuple[str, ...] = ()
     pull_downs: tuple[str, ...] = ()
+    allow_contention: tuple[str, ...] = ()
     nets: dict[str, str | tuple[str, ...]] = {}
     straps: dict[str, StrapSpec] = {}
     latches: dict[str, LatchSpec] = {}
@@ -157,6 +158,7 @@ def _spec(file: _File, parts: dict[str, PartSpec], name: str) -> BoardSpec:
         check_strobes=True,
         pull_ups=file.pull_ups,
         pull_downs=file.pull_downs,
+        allow_contention=file.allow_contention,
         nets={net: (pins,) if isinstance(pins, str) else pins for net, pins in file.nets.items()},
         straps=file.straps,
         latches=file.latches,

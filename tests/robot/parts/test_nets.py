@@ -143,6 +143,19 @@ def test_two_outputs_of_different_level_are_a_fault_that_names_both():
     assert faults(board) == [(9, "net n: left.q and right.r"), (90, "net n: left.q and right.r")]
 
 
+def test_contention_that_is_allowed_on_a_net_is_no_fault_there_and_the_low_level_wins():
+    parts = [
+        scripted("left", [(5, Q, HIGH), (6, W, HIGH)]),
+        scripted("right", [(9, R, LOW), (12, Q, LOW)]),
+        scripted("third"),
+    ]
+    nets = [{Q: "n", W: "m"}, {R: "n", Q: "m"}, {A: "n"}]
+    board = board_of(netlist=wired({}, nets, allow_contention=["n"]), parts=parts)
+    board.sync(100)
+    assert faults(board) == [(12, "net m: left.w and right.q")]
+    assert levels(board)["n"] == 0
+
+
 def test_a_port_that_pulls_low_against_an_output_is_one():
     board = one_net(scripted("a", [(5, Q, HIGH)]), pins=[Q])
     board.port_written(P1, 0xFB, 12)

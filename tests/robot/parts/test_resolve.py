@@ -75,6 +75,7 @@ def test_latches_buffers_straps_and_resistors_hang_on_nets():
         straps={"mode": StrapSpec(pin="P3.4", level=0)},
         pull_ups=("P0",),
         pull_downs=("P2.0",),
+        allow_contention=("P0", "K"),
     )
     netlist = resolve(spec)
     number = netlist.names.index
@@ -82,6 +83,7 @@ def test_latches_buffers_straps_and_resistors_hang_on_nets():
     assert netlist.buffers[0][:2] == (number("K"), number("P1.1"))
     assert (netlist.lows, netlist.highs) == ((number("P3.4"),), ())
     assert (netlist.pull_ups, netlist.pull_downs) == ((number("P0.1"),), (number("P2.0"),))
+    assert netlist.allow_contention == (number("K"), number("P0.1"))
 
 
 def test_constants_are_nets_of_their_own():
