@@ -22,19 +22,20 @@ from mirotwin.testing.waiting import WaitFailed, shown_where_it_was_called
 from mirotwin.verify.checks.happens import expect_of
 from mirotwin.verify.checks.interface import ms_ticks
 
-MS = "give within_ms"
 _KEPT = 1 << 16
 _PORTS = (0x80, 0x90, 0xA0, 0xB0)
 
 
 def ticks_of(world: World, within: int | None, within_ms: float | None) -> int | None:
-    """How long a wait lasts: `within_ms`, or `within` in ticks of 24 MHz, as `mirotwin.ms` gives them."""
+    """How long a wait lasts: `within_ms`, or `within` as `mirotwin.ms` gives it, in ticks of 24 MHz of any board."""
     if within_ms is not None:
         return ms_ticks(within_ms, world.clock)
-    if within is not None and world.clock != TICKS_PER_SECOND:
-        reason = f"within counts ticks of 24 MHz, and this board has {world.clock / 1e6:g} MHz"
-        raise ValueError(f"{reason}; {MS} instead")
-    return within
+    return None if within is None else own_ticks(world, within)
+
+
+def own_ticks(world: World, duration: int) -> int:
+    """A duration as `mirotwin.ms` gives it, in ticks of the board's crystal, rounded half up."""
+    return (2 * duration * world.clock + TICKS_PER_SECOND) // (2 * TICKS_PER_SECOND)
 
 
 class BoardUnderTest(DeviceUnderTest):
@@ -82,9 +83,9 @@ class BoardUnderTest(DeviceUnderTest):
         return board.nets.levels[net] ^ int(place.inverted)
 
     @shown_where_it_was_called
-    def run(self, for_ms: float) -> None:
-        """Lets time pass."""
-        self.world.run_for(ms_ticks(for_ms, self.world.clock))
+    def run_for(self, duration: int) -> None:
+        """Lets time pass: `run_for(mirotwin.ms(250))`."""
+        self.world.run_for(own_ticks(self.world, duration))
 
     @shown_where_it_was_called
     def wait_for(
