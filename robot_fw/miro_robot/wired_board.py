@@ -311,7 +311,7 @@ class WiredBoard(EmptyBoard):
         before = None
         for fault in found:
             if _order_and_kind(fault) != before and not self.forced:
-                self._note_fault(fault[1], self.cpu.at, tick, fault[2])
+                self._note_fault(fault[1], self.cpu.at, tick - fault[3], fault[2])
             before = _order_and_kind(fault)
 
     # Tests

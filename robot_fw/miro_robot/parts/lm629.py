@@ -134,7 +134,7 @@ class Lm629Part(Part):
             # A MOVX takes what it reads a tick before /RD rises; after port pins that is never too early.
             broken = self.timing.sampled(tick - 1)
             if broken:
-                self.fault(_TIMING, LIMITS[broken].breach(self.timing.ticks), -1)
+                self.fault(_TIMING, LIMITS[broken].breach(self.timing.ticks), -1, 1)
         broken = self.timing.pins(tick, cs, rd, wr, ps, data)
         if broken:
             self.fault(_TIMING, LIMITS[broken].breach(self.timing.ticks), 0)

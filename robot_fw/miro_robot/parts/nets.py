@@ -100,7 +100,7 @@ class Nets:
     After the nets of the list comes one for each port pin that is on none of them; it is kept while it is observed.
     `next_tick`, `reach_tick`: of the next event of a part; of the next that may change a port pin, or let two outputs
     meet. `external`: by port, what the outside puts on its pins; `ports_changed`: bit per port, since it was cleared.
-    `levels`: by net. `faults`: of the firmware, as parts have found them, until they are taken: order, kind, detail.
+    `levels`: by net. `faults`: of the firmware, as parts have found them, until they are taken.
     """
 
     NOT_STATE = ("*",)
@@ -142,7 +142,7 @@ class Nets:
         self.moving = [0] * 64  # parts that have driven pins in this one
         self.is_moving = [0] * 64
         self.moving_count = 0
-        self.faults: list[tuple[int, int, str]] = []
+        self.faults: list[tuple[int, int, str, int]] = []
         self.called = -1  # the part that is being called, why, and for which of its pins
         self.called_why = 0
         self.called_pins = 0

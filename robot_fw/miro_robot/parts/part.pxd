@@ -18,7 +18,7 @@ cdef class Part:
     cpdef int others(self, int pin) noexcept
     cpdef int is_driven(self, int pin) noexcept
     cpdef int drive(self, int pin, int level) except -1
-    cpdef fault(self, int kind, str detail, int order=*)
+    cpdef fault(self, int kind, str detail, int order=*, int ago=*)
     cdef _named(self, int pin)
     cpdef long long ticks(self, double us) except? -1
     cpdef start(self, long long tick)

@@ -66,7 +66,9 @@ class Part:
             self.high_pins |= int(pin.kind in (STRONG, TWO_WAY)) << number
         self.wanted = [RELEASED] * 32
         self.drives = [RELEASED] * 32
-        self.faults: list[tuple[int, int, str]] = []  # order, kind, detail: since the last call
+        self.faults: list[
+            tuple[int, int, str, int]
+        ] = []  # order, kind, detail, ticks ago: since the last call
 
     # What it may ask and do
 
@@ -97,13 +99,13 @@ class Part:
             self.wanted[pin] = level
             self.moved |= 1 << pin
 
-    def fault(self, kind: int, detail: str, order: int = 0) -> None:
-        """The firmware does to the part what it must not (`faults.py`), on the tick of this call.
+    def fault(self, kind: int, detail: str, order: int = 0, ago: int = 0) -> None:
+        """The firmware does to the part what it must not (`faults.py`), on the tick of this call or `ago` ticks before.
 
         What it does to several parts on one tick is one fault if kind and `order` are the same: of a tick, those of
         lower order come first.
         """
-        self.faults.append((order, kind, detail))
+        self.faults.append((order, kind, detail, ago))
 
     def _named(self, pin: int) -> str:
         return self.keys.PINS[pin].name if pin < len(self.keys.PINS) else str(pin)
