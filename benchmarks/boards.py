@@ -19,18 +19,28 @@ from statistics import median
 from typing import NamedTuple
 
 from miro_exact import engine
+from miro_exact.clock import CHARACTER_BITS, CONTROL_PERIOD_TICKS, CYCLE_TICKS
+from miro_host.station import Station
+from miro_robot.board import Board
 from miro_robot.board_spec import BoardSpec, PartSpec
 from miro_robot.build import board_of
 from miro_robot.empty_board import EmptyBoard
-from miro_robot.image import SPACE_BYTES, Image, Symbols
+from miro_robot.firmware import image_path
+from miro_robot.image import SPACE_BYTES, Image, Symbols, load_hex
 from miro_robot.parts.keys import LOW, OPEN_DRAIN, RELEASED, PartKeys, Pin, Place
 from miro_robot.parts.led import Led
 from miro_robot.parts.netlist import Netlist
 from miro_robot.parts.part import Part
+from miro_robot.processor_board import ProcessorBoard
 from miro_robot.wired_board import WiredBoard
+from miro_robot.wiring import load_wiring
+from miro_sim.plant.drive import DifferentialDrive
+from miro_sim.plant.params import DriveParams
+from miro_sim.scenario.board_file import load_board
 
 CRYSTAL_HZ = 24_000_000
 EDGE_TICKS = 12 * 100
+BIT_TICKS = CRYSTAL_HZ // 9600
 WAIT = bytes([0x7F, 47, 0xDF, 0xFE, 0x80])  # MOV R7,#47; DJNZ R7,$; SJMP
 IDLE = bytes([0x80, 0xFE])
 
@@ -87,11 +97,12 @@ class ClockPart(Part):
 
 
 class Case(NamedTuple):
-    """`base`: the case whose time is taken off."""
+    """`base`: the case whose time is taken off. `driven`: a robot with the shipped firmware gets commands."""
 
     name: str
-    make: Callable[[], EmptyBoard]
+    make: Callable[[], ProcessorBoard]
     base: str = ""
+    driven: bool = False
 
 
 def empty(program: bytes) -> EmptyBoard:
@@ -113,6 +124,16 @@ def image_of(program: bytes) -> Image:
     return Image(Path("program"), code, ((0, len(program)),), len(program), digest, Symbols({}))
 
 
+def compiled_miro() -> ProcessorBoard:
+    board = Board(load_wiring(), DifferentialDrive(DriveParams()))
+    board.load(load_hex(image_path()))
+    return board
+
+
+def net_list_miro() -> ProcessorBoard:
+    return board_of(load_board("miro"), load_hex(image_path()), 0, False)
+
+
 ELSEWHERE = [(f"P{port}.{bit}", Led()) for port in (0, 3) for bit in (2, 3, 4, 5)] + [("P1.6", Led())]
 P1, P2 = toggling(0x97), toggling(0xA7)
 CASES = [
@@ -126,6 +147,8 @@ CASES = [
     Case("P1, part in Python", lambda: with_parts(P1, ("P1.7", PythonLed())), "P1, empty board"),
     Case("idle loop", lambda: empty(IDLE)),
     Case("a part drives P2.7, 1 kHz", lambda: with_parts(IDLE, ("P2.7", Clock())), "idle loop"),
+    Case("MIRO drives, compiled board", compiled_miro, driven=True),
+    Case("MIRO drives, net list", net_list_miro, driven=True),
 ]
 
 
@@ -140,10 +163,11 @@ def main(arguments: list[str] | None = None) -> int:
     chosen = [case for case in CASES if not options.only or any(text in case.name for text in options.only)]
     needed = {base for case in chosen for base in (case.name, case.base)}
     boards = {case.name: case.make() for case in CASES if case.name in needed}
+    stations = {case.name: Station(3) for case in CASES if case.driven}
     spent: dict[str, list[float]] = {name: [] for name in boards}
     for number in range(1, options.rounds + 2):
         for name, board in boards.items():
-            spent[name].append(_time(board, int(number * options.seconds * CRYSTAL_HZ)))
+            spent[name].append(_time(board, int(number * options.seconds * CRYSTAL_HZ), stations.get(name)))
     medians = {name: median(times[1:]) for name, times in spent.items()}  # the first warms up
     print(f"engine {engine.active()}, {options.seconds:g} s of the board, median of {options.rounds}")
     for case in CASES:
@@ -152,10 +176,28 @@ def main(arguments: list[str] | None = None) -> int:
     return 0
 
 
-def _time(board: EmptyBoard, tick: int) -> float:
+def _time(board: ProcessorBoard, tick: int, station: Station | None) -> float:
+    if station is not None:
+        first = board.cpu.cycles * CYCLE_TICKS
+        return sum(_drive(board, begin, station) for begin in range(first, tick, CONTROL_PERIOD_TICKS))
     board.cpu.rxd.settled_tick = tick + 1_000
     start = time.process_time()
     board.run(tick)
+    return time.process_time() - start
+
+
+def _drive(board: ProcessorBoard, begin: int, station: Station) -> float:
+    """The time of a control period in which the host sends a frame: both wheels turn, not alike."""
+    level, tick = 1, begin + CONTROL_PERIOD_TICKS // 2
+    for value in station.frame([(1500, 2000), (0, 0), (0, 0)]):
+        for place, bit in enumerate((0, *(value >> n & 1 for n in range(8)), 1)):
+            if bit != level:
+                board.cpu.rxd.append(tick + place * BIT_TICKS, bit)
+                level = bit
+        tick += CHARACTER_BITS * BIT_TICKS
+    board.cpu.rxd.settled_tick = begin + CONTROL_PERIOD_TICKS + 1_000
+    start = time.process_time()
+    board.run(begin + CONTROL_PERIOD_TICKS)
     return time.process_time() - start
 
 
