@@ -159,8 +159,10 @@ def test_a_file_is_read_as_it_says():
     )
 
 
-def test_a_board_of_a_file_has_no_external_ram_unless_it_says_so():
+def test_a_board_of_a_file_has_no_ram_for_movx_but_that_of_its_chip_unless_it_says_so():
     assert board(HEAD).xram == "none"
+    assert board('chip = "stc89c52"\n' + HEAD).xram == "internal"
+    assert board('chip = "stc89c52"\nxram = "none"\n' + HEAD).xram == "none"
     assert BoardSpec().xram == "external"
 
 

@@ -58,7 +58,7 @@ class _File(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_only=Tru
     chip: str = "at89c52"
     crystal_hz: Crystal
     mode: str = "12T"
-    xram: Literal["none", "internal", "external"] = "none"
+    xram: Literal["none", "internal", "external"] | None = None
     xram_bytes: Annotated[int, Meta(ge=1, le=XRAM_BYTES)] | None = None
     pull_ups: tuple[str, ...] = ()
     pull_downs: tuple[str, ...] = ()
@@ -69,6 +69,11 @@ class _File(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_only=Tru
     buffers: dict[str, BufferSpec] = {}
     serial: _Serial | None = None
     parts: dict[str, dict[str, Any]] = {}
+
+    @property
+    def memory(self) -> Literal["none", "internal", "external"]:
+        """Where MOVX goes. Not said: into the RAM of the chip, which is on after a reset, if it has one."""
+        return self.xram or ("internal" if CHIPS[self.chip].xram_bytes else "none")
 
 
 # Finding and reading
@@ -153,7 +158,7 @@ def _spec(file: _File, parts: dict[str, PartSpec], name: str) -> BoardSpec:
         name=name,
         chip=file.chip,
         crystal_hz=file.crystal_hz,
-        xram=file.xram,
+        xram=file.memory,
         xram_bytes=_xram_bytes(file),
         check_strobes=True,
         pull_ups=file.pull_ups,
@@ -184,9 +189,9 @@ def _check_processor(file: _File) -> None:
 
 def _check_memory(file: _File) -> None:
     """That no two answer to one address of MOVX."""
-    if file.xram_bytes is not None and file.xram != "external":
+    if file.xram_bytes is not None and file.memory != "external":
         raise BoardError(
-            "", "xram_bytes", f"the board's xram is {file.xram!r}", 'give xram = "external", too'
+            "", "xram_bytes", f"the board's xram is {file.memory!r}", 'give xram = "external", too'
         )
     for table in ("latches", "buffers"):
         before: dict[str, LatchSpec | BufferSpec] = {}
