@@ -55,7 +55,8 @@ class BoardSpec(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_only
 
     `xram`: where MOVX goes, `xram_bytes` of it if that is external. `code_in_xram`: EA low, program and data share one
     RAM of 64 KB. `start`: address of the first instruction, as after a jump there by a monitor. `bound_stack`: SP that
-    leaves the stack of the image is a fault. `check_strobes`: a MOVX while P3.6 or P3.7 holds its strobe is one.
+    leaves the stack of the image is a fault. `of_file`: a board file describes it: its port pins
+    are nets, and a MOVX while P3.6 or P3.7 holds its strobe is a fault.
     `nets`: a name for the net of a port pin, or of several. `pull_ups`, `pull_downs`: nets, port pins, whole ports.
     `allow_contention`: the same, on which outputs of different level are no fault; the low one wins.
     `baud`: of what a terminal sends; 0: the receiver's own rate.
@@ -71,7 +72,7 @@ class BoardSpec(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_only
     code_in_xram: bool = False
     start: int = 0
     bound_stack: bool = True
-    check_strobes: bool = False
+    of_file: bool = False
     pull_ups: tuple[str, ...] = ()
     pull_downs: tuple[str, ...] = ()
     allow_contention: tuple[str, ...] = ()
@@ -91,5 +92,7 @@ class BoardSpec(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_only
 
     @property
     def is_wired(self) -> bool:
-        """Whether there is more on it than the processor and its memory."""
-        return bool(self.parts or self.straps or self.latches or self.buffers or self.pull_downs)
+        """Whether it has nets: there is more on it than the processor and its memory, or a file describes it."""
+        return bool(
+            self.of_file or self.parts or self.straps or self.latches or self.buffers or self.pull_downs
+        )

@@ -272,7 +272,7 @@ class EmptyBoard(ProcessorBoard):
 
     def movx_without_strobe(self, address: int, write: int) -> None:
         """A fault on boards that are described: on a bare processor nobody says what P3.6 and P3.7 are for."""
-        if self.spec.check_strobes and not self.forced:
+        if self.spec.of_file and not self.forced:
             detail = f"MOVX {'write' if write else 'read'} of {address:#06x}, P3.{6 if write else 7} is 0"
             self._note_fault(_MOVX_WITHOUT_STROBE, self.cpu.at, self.cpu.cycles * CYCLE_TICKS, detail)
 

@@ -141,7 +141,7 @@ def test_a_file_is_read_as_it_says():
         chip="stc89c52",
         crystal_hz=11_059_200,
         xram_bytes=0x4000,
-        check_strobes=True,
+        of_file=True,
         pull_ups=("P0", "SDA"),
         pull_downs=("P2.0",),
         allow_contention=("P0",),

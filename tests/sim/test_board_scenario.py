@@ -5,6 +5,8 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from miro_exact.bad_input import BadInput
+from miro_robot.board_spec import BoardSpec
+from miro_sim.scenario.board_file import load_board
 from miro_sim.scenario.board_scenario import BoardText, any_of_text, load_any
 from miro_sim.scenario.file import load
 from tests.mirotwin.board_files import SCENARIO, board_folder
@@ -140,3 +142,11 @@ def test_any_text_is_a_scenario_or_bad_input(text, settings):
     else:
         return
     assert len(lines) == 1
+
+
+def test_pins_of_a_board_without_parts_are_seen_as_those_of_any_other(tmp_path):
+    """The bare processor of `--bare` has no nets; a board file has, whatever is on it."""
+    (tmp_path / "bare.board.toml").write_text("crystal_hz = 12_000_000\n")
+    spec = load_board(str(tmp_path / "bare.board.toml"))
+    assert spec.is_wired
+    assert not BoardSpec().is_wired

@@ -160,7 +160,7 @@ def _spec(file: _File, parts: dict[str, PartSpec], name: str) -> BoardSpec:
         crystal_hz=file.crystal_hz,
         xram=file.memory,
         xram_bytes=_xram_bytes(file),
-        check_strobes=True,
+        of_file=True,
         pull_ups=file.pull_ups,
         pull_downs=file.pull_downs,
         allow_contention=file.allow_contention,
@@ -298,6 +298,6 @@ def table_of(spec: BoardSpec) -> dict[str, Any]:
         table["serial"] = {"baud": baud}
     if spec.xram != "external":
         del table["xram_bytes"]
-    for key in ("code_in_xram", "start", "bound_stack", "check_strobes"):  # a board file has none of these
+    for key in ("code_in_xram", "start", "bound_stack", "of_file"):  # a board file has none of these
         del table[key]
     return {key: value for key, value in table.items() if value not in ([], (), {})}

@@ -131,7 +131,7 @@ def test_movx_reaches_the_ram_that_is_there(keys, address, value, parts):
 
 def test_ram_on_the_chip_needs_no_bus():
     program = "MOV P3,#3Fh\nMOV P2,#12h\nMOV P0,#77h\nMOV R0,#9\nMOV A,#5Ah\nMOVX @R0,A\nCLR A\nMOVX A,@R0\nMOV R7,P0"
-    board = made(program, xram="internal", chip="stc89c52", check_strobes=True)
+    board = made(program, xram="internal", chip="stc89c52", of_file=True)
     assert (board.cpu.a, board.cpu.peek_iram(7)) == (0x5A, 0x77)
     assert board.xram()[9] == 0x5A
 
@@ -141,7 +141,7 @@ def test_ram_on_the_chip_needs_no_bus():
 )
 def test_a_movx_without_its_strobe_is_a_fault_where_that_is_asked_for(port, line, word):
     program = f"CLR P3.{port}\nMOV DPTR,#1234h\n{line}\nSJMP $"
-    board = board_of(BoardSpec(check_strobes=True), image_of(program))
+    board = board_of(BoardSpec(of_file=True), image_of(program))
     assert board.run(1_000) == STOPPED
     (fault,) = board.faults
     assert (fault.kind, fault.detail) == (
