@@ -11,6 +11,7 @@ from miro_robot.empty_board import EmptyBoard
 from miro_robot.image import Image
 from miro_robot.parts.keys import Place
 from miro_robot.parts.netlist import Netlist
+from miro_robot.parts.own import check_made
 from miro_robot.parts.part import Part
 from miro_robot.parts.resolve import resolve
 from miro_robot.wired_board import WiredBoard
@@ -61,9 +62,10 @@ def parts_of(spec: BoardSpec, netlist: Netlist, seed: int) -> list[Part]:
 def _made(spec: BoardSpec, place: Place) -> Part:
     keys = spec.parts[place.name].keys
     try:
-        return keys.make(place)
+        made = keys.make(place)
     except BadInput:
         raise
     except (Exception, SystemExit) as error:
         reason = f"part {place.name!r} ({keys.name}) cannot be made: {raised(error)}"
         raise PluginError(reason, "repair the part") from error
+    return check_made(made, keys, place)

@@ -27,6 +27,7 @@ from miro_robot.mcs51.cpu import REPLAN, STOPPED
 from miro_robot.mcs51.opcodes import CYCLES
 from miro_robot.parts.netlist import Netlist
 from miro_robot.parts.nets import Nets
+from miro_robot.parts.own import check_state
 from miro_robot.parts.part import Part
 
 _CONTENTION = int(FaultKind.NET_CONTENTION)
@@ -85,6 +86,7 @@ class WiredBoard(EmptyBoard):
         self.cpu.main_loop_limit = spec.crystal_hz // (100 * CYCLE_TICKS)  # cycles in 10 ms
         self.nets.ports_changed = 0xF  # straps hold pins from the beginning
         self._supply(1, 0)
+        self.before_save()
 
     def _decode(self, spec: BoardSpec) -> None:
         """Addresses of output latches and input buffers."""
@@ -309,10 +311,10 @@ class WiredBoard(EmptyBoard):
         found = sorted(self.nets.faults, key=_order_and_kind)
         self.nets.faults = []
         before = None
-        for fault in found:
-            if _order_and_kind(fault) != before and not self.forced:
-                self._note_fault(fault[1], self.cpu.at, tick - fault[3], fault[2])
-            before = _order_and_kind(fault)
+        for order, kind, detail, ago in found:
+            if (order, kind) != before and not self.forced:
+                self._note_fault(kind, self.cpu.at, tick - ago, detail)
+            before = (order, kind)
 
     # Tests
 
@@ -398,6 +400,12 @@ class WiredBoard(EmptyBoard):
         self._push(tick)
 
     # State
+
+    def before_save(self) -> None:
+        """Raises PluginError for a part whose attributes are not what its STATE says: it could not go on from that."""
+        for part in self.parts:
+            if hasattr(part, "__dict__"):  # the table of a compiled class was checked as it was built
+                check_state(part, self.cpu.cycles * CYCLE_TICKS)
 
     def after_load(self) -> None:
         """Works out the nets again. Raises ValueError for a part that is far behind."""

@@ -20,9 +20,11 @@ from typing import Any
 
 from miro_exact.clock import NEVER_TICK
 from miro_exact.state import TICK
+from miro_robot.faults import FaultKind
 from miro_robot.parts.keys import IN, LOW, MOST_PINS, RELEASED, STRONG, TWO_WAY, PartKeys, Place
 
 _NEVER = NEVER_TICK
+_FAULT_KINDS = frozenset(int(kind) for kind in FaultKind)
 
 
 class Part:
@@ -103,8 +105,10 @@ class Part:
         """The firmware does to the part what it must not (`faults.py`), on the tick of this call or `ago` ticks before.
 
         What it does to several parts on one tick is one fault if kind and `order` are the same: of a tick, those of
-        lower order come first.
+        lower order come first. Raises ValueError for a kind that there is not.
         """
+        if kind not in _FAULT_KINDS:
+            raise ValueError(f"has found a fault of kind {kind}, which does not exist")
         self.faults.append((order, kind, detail, ago))
 
     def _named(self, pin: int) -> str:

@@ -27,6 +27,7 @@ LONGEST_WAY = 64
 NAME = re.compile(r"[A-Za-z_]\w{0,63}", re.ASCII)
 _PORT_PIN = re.compile(r"P[0-3]\.[0-7]")
 _PORT = re.compile(r"P[0-9]")
+_LIKE_A_PORT = re.compile(r"[Pp][0-9]")
 _PORT_LIKE = re.compile(r"P[0-9]+\.[0-9]+|P[0-9]")
 _BITS = "01234567"
 
@@ -213,6 +214,8 @@ class _Resolver:
     ) -> tuple[str, bool]:
         """Where a pin of another part leads; a pin that nothing else is said of is a net by itself."""
         if owner not in self.spec.parts:
+            if _LIKE_A_PORT.fullmatch(owner):
+                raise BoardError("", place, f"there is no port pin {f'{owner}.{pin}'!r}", "use P0.0 to P3.7")
             known = [*self.spec.parts, *self.spec.latches]
             remedy = did_you_mean(owner, known, f"add [parts.{owner}]")
             raise BoardError("", place, f"there is no part {owner!r}", remedy)

@@ -41,10 +41,10 @@ _FASTEST_BIT_TICKS = 32
 MOST_PART_PINS = MOST_PINS - 2
 
 _REMEDIES = {
-    "crystal_hz": "give what is printed on the crystal, 32_000 to 40_000_000, as crystal_hz = 11_059_200",
+    "crystal_hz": "give what is printed on the crystal, 32_768 to 40_000_000, as crystal_hz = 11_059_200",
 }
 _T = TypeVar("_T", bound=msgspec.Struct)
-Crystal = Annotated[int, Meta(ge=32_000, le=40_000_000)]
+Crystal = Annotated[int, Meta(ge=32_768, le=40_000_000)]
 
 
 class _Serial(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
