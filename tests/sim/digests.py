@@ -4,6 +4,8 @@ With names of runs it prints their digests: `python -m tests.sim.digests "fig6 0
 
 Every built-in scenario, every kind of camera and picture noise, every profile of the radio, both variants, every
 disturbance, and two teams: at full length with seed 7, beside a short run for engines and machines that are slow.
+`board_digests.json`: every scenario file of the boards among the examples as `mirotwin test` runs it; a car with noise
+and an encoder; a robot whose board is a net list; and parts alone. First come the short ones.
 
 Functions import what has to wait until the engine is chosen.
 """
@@ -24,7 +26,25 @@ REFUSED = 3
 """Exit code where this Python or its engine is refused; the reason stands in one line on stderr."""
 ROOT = Path(__file__).parents[2]
 GOLDEN = ROOT / "tests" / "vectors" / "digests.json"
+BOARDS = ROOT / "tests" / "vectors" / "board_digests.json"
 SHORT = "fig6 0.5 s seed 7"
+NOISY = (
+    "examples/boards/car/emergency.scenario.toml {} s seed 7 --set board.parts.eyes.noise_cm=0.5"
+    ' --set board.parts.wheel={{part="encoder",pins={{shaft="left.shaft",a="P3.4",b="P3.5"}},lines=200}}'
+)
+SHORTEST_BOARDS = (
+    "examples/boards/modbus/coils.scenario.toml 0.2 s seed 0",
+    NOISY.format("0.2"),
+    "net list: fig6 0.06 s seed 7",
+    "parts: 200 steps seed 1",
+)
+"""Those that uncompiled code runs through in a second or two."""
+SHORT_BOARDS = (
+    *SHORTEST_BOARDS,
+    "examples/boards/car/emergency.scenario.toml 0.4 s seed 0",
+    "examples/boards/rover/turns.scenario.toml 0.4 s seed 0",
+)
+"""Those that an emulated processor runs through in seconds."""
 TWO_TEAMS = "examples/two_teams.toml"
 CAMERAS = (
     'camera={kind="gaussian"}',
@@ -59,6 +79,15 @@ def parse(name):
 
 def digest(name):
     """Runs it from begin to end."""
+    kind, _, rest = name.rpartition(": ")
+    return _OF_KIND[kind](rest)
+
+
+def _of_scenario(name):
+    if parse(name).scenario.endswith(".scenario.toml"):
+        from tests.sim import board_runs
+
+        return board_runs.digest(parse(name))
     from miro_robot.firmware import image_path
     from miro_robot.image import load_hex
     from miro_sim.scenario.file import load
@@ -70,6 +99,26 @@ def digest(name):
     while not world.finished:
         world.step()
     return world.digest
+
+
+def _of_net_list(name):
+    """Of a run whose robots have net lists in place of the compiled board."""
+    from tests.sim.netlist.net_board import NetBoard
+    from tests.sim.netlist.runs import boards_are
+
+    with boards_are(NetBoard):
+        return _of_scenario(name)
+
+
+def _of_parts(name):
+    """Of parts on nets without a processor, `N steps seed N`: motors, encoders, a servo, and what belongs to them."""
+    from tests.sim.plant import part_session
+
+    steps, _, _, seed = name.split()
+    return part_session.digest(int(seed), int(steps)).split()[0]
+
+
+_OF_KIND = {"": _of_scenario, "net list": _of_net_list, "parts": _of_parts}
 
 
 def names():
@@ -94,6 +143,19 @@ def names():
         yield _name("fig6", "variant=ideal", *case.settings)
 
 
+def board_names():
+    """Of all runs of boards, the short ones first."""
+    from miro_sim.scenario.board_scenario import load_any
+
+    yield from SHORT_BOARDS
+    for path in sorted(ROOT.glob("examples/boards/*/*.scenario.toml")):
+        scenario = load_any(str(path)).scenario
+        yield f"{path.relative_to(ROOT).as_posix()} {scenario.duration_ticks / scenario.clock:g} s seed 0"
+    yield NOISY.format("1.5")
+    yield f"net list: {SHORT}"
+    yield "parts: 1000 steps seed 2"
+
+
 def _name(scenario, *settings):
     from miro_sim.scenario.file import load
 
@@ -101,6 +163,11 @@ def _name(scenario, *settings):
     return f"{scenario} {duration_s:g} s seed 7" + "".join(
         f" --set {one.replace(' ', '')}" for one in settings
     )
+
+
+def table_in(path):
+    """Name of a run -> its digest."""
+    return json.loads(path.read_text()) if path.exists() else {}
 
 
 def main():
@@ -112,25 +179,27 @@ def main():
         "--engine", choices=engine.ENGINES, default="compiled", help="python: uncompiled, for minutes"
     )
     options = parser.parse_args()
-    golden = json.loads(GOLDEN.read_text())
     try:
         engine.select(options.engine)
         for name in options.name:
             print(digest(name), flush=True)
         if options.name:
             return 0
-        wanted = list(names())
+        tables = {GOLDEN: list(names()), BOARDS: list(board_names())}
+        wanted = [name for table in tables.values() for name in table]
         with children.pool() as pool:
             digests = pool.map(partial(_digest, options.engine), wanted)
             found = dict(zip(wanted, digests, strict=True))
     except engine.EngineError as error:
         print(error, file=sys.stderr)
         return REFUSED
+    golden = {name: digest for path in tables for name, digest in table_in(path).items()}
     differing = [name for name in {**golden, **found} if golden.get(name) != found.get(name)]
     for name in differing:
         print(name)
     if options.write:
-        GOLDEN.write_text(json.dumps(found, indent=1) + "\n")
+        for path, table in tables.items():
+            path.write_text(json.dumps({name: found[name] for name in table}, indent=1) + "\n")
     return 1 if differing and not options.write else 0
 
 
