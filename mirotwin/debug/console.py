@@ -13,6 +13,8 @@ from cmd import Cmd
 from collections.abc import Iterator
 from typing import Any
 
+import msgspec
+
 from miro_exact.bad_input import BadInput
 from miro_exact.clock import CYCLE_TICKS, TICKS_PER_SECOND
 from miro_protocol.toml_text import TomlError, struct_of
@@ -177,7 +179,9 @@ class Console(Cmd):
         if "slot" in fields:
             given["slot"] = device.slot
         for key, _, value in (word.partition("=") for word in keys):
-            given[key] = int(value, 16) if _HEX.fullmatch(value) else value
+            given[key] = (
+                int(value, 16) if _HEX.fullmatch(value) else _literal(value) if key == "equals" else value
+            )
         try:
             event = self.debugger.until(struct_of(given, kind, strict=False))
         except TomlError as error:
@@ -287,3 +291,12 @@ def shown_value(shown: Any) -> str:
     if isinstance(shown, bool) or not isinstance(shown, int) or -10 < shown < 10:
         return str(shown)
     return f"{shown} ({shown:#x})"
+
+
+def _literal(text: str) -> bool | float | str:
+    """A number, true or false as in a scenario file; all else, and what stands in quotes, is a text."""
+    try:
+        value = msgspec.json.decode(text)
+    except msgspec.DecodeError:
+        return text
+    return value if isinstance(value, bool | int | float | str) else text

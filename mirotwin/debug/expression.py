@@ -132,6 +132,17 @@ def _part(value: Value, kind: CType, offset: int) -> Value:
     return msgspec.structs.replace(value, kind=kind, address=value.address + offset)
 
 
+def _with_members(value: Value, moment: Lookup, text: str) -> Value:
+    """Of a name that both the program and a part of the board have: the part, where only that has members."""
+    if value.members is not None or children(value):
+        return value
+    try:
+        parts = moment.find("parts", "").members or {}
+    except NoValue:
+        return value
+    return parts[text]() if text in parts else value
+
+
 def _member(value: Value, name: str, text: str) -> Value:
     there = {} if value.kind is not None and value.kind.kind == "array" else dict(children(value))
     if name not in there:
@@ -337,7 +348,7 @@ def _indexed(term: Term, index: Term, text: str) -> Term:
 def _member_of(term: Term, name: str, text: str) -> Term:
     """A member, or by a number a bit. `text` is the term's own."""
     if not name.isdecimal():
-        return lambda moment: _member(term(moment), name, text)
+        return lambda moment: _member(_with_members(term(moment), moment, text), name, text)
     index = int(name[:9])
 
     def bit(moment: Lookup) -> Value:

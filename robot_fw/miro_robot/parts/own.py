@@ -10,6 +10,8 @@ from miro_exact.state import kind_of, table
 from miro_robot.parts.keys import PartKeys, Place
 from miro_robot.parts.part import Part
 
+_CODES = 'of a number it is "q" (whole), "d", or one of these with limits: ("d", 0.0, 9.0)'
+
 
 def check_made(made: Any, keys: PartKeys, place: Place) -> Part:
     """What `make` returned, which has to be a new part with these keys at this place. Raises PluginError."""
@@ -41,12 +43,16 @@ def _check(part: Part) -> None:
             raise ValueError(f"attribute {name!r} is neither in STATE nor in NOT_STATE")
     for name, declared in state.items():
         if isinstance(declared, type | list):  # it has a table of its own
+            if isinstance(declared, type) and not table(declared):
+                raise ValueError(f"STATE[{name!r}] = {declared.__name__}, which has no STATE; {_CODES}")
             continue
         try:
             kind = kind_of(declared)
             value = kind.read(part, name) if name in own else getattr(part, name)
         except Exception as error:
             raise ValueError(f"STATE[{name!r}] = {declared!r:.60}: {described(error)}") from error
+        if kind.form.endswith(("e", "f")):  # would come back rounded
+            raise ValueError(f"STATE[{name!r}] = {declared!r:.60}; {_CODES}")
         if name not in own:
             continue
         try:

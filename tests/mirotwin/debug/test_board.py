@@ -7,6 +7,7 @@ import pytest
 from miro_exact.bad_input import BadInput
 from miro_protocol.actions import Put
 from miro_robot.image.debug_info import Sources
+from miro_robot.image.symbol_files import Symbol
 from mirotwin.debug.board_values import names_on
 from mirotwin.debug.console import Console
 from mirotwin.debug.debugger import Debugger
@@ -67,6 +68,30 @@ def test_until_stops_before_the_first_instruction_at_which_it_is_true_and_going_
 
 def test_an_event_is_told_without_the_place_which_a_board_alone_does_not_have(console):
     assert re.search(r"  tick \d+: edge P1\.0 to 0: 0x", said(console, "until edge pin=P1.0 level=0"))
+
+
+@pytest.mark.parametrize("word", ["1", "1.0", "true", "0x1"])
+def test_an_event_of_a_value_takes_numbers_and_truths(console, word):
+    assert "value lamp.on = 1" in said(console, f"until value of=lamp.on equals={word}")
+
+
+@pytest.fixture
+def console_of_namesakes(monkeypatch):
+    """A program with a function `lamp` and a variable `key`."""
+    run = InspectedRun(world_of((Put(PRESSED_TICK, 0, 0, "key.pressed", True),), duration_ticks=CRYSTAL_HZ))
+    symbols = Symbols(run.image, Sources([]), names_on(run.device.board))
+    names = {"lamp": Symbol(0x0D, "code"), "key": Symbol(0x30, "iram")}
+    monkeypatch.setattr(run.image.symbols, "find", names.get)
+    return Console(Debugger(Timeline(run), symbols))
+
+
+def test_a_part_is_found_by_its_values_where_the_program_has_its_name(console_of_namesakes):
+    console = console_of_namesakes
+    assert said(console, "print lamp").startswith("lamp = 13")
+    assert "lamp.on == 1 is true" in said(console, "until lamp.on == 1")
+    assert said(console, "print key.pressed") == "key.pressed = 1"
+    with pytest.raises(BadInput, match="key has no member on"):
+        console.do("print key.on")
 
 
 def test_a_breakpoint_may_ask_for_parts(console):

@@ -1,6 +1,7 @@
 """`mirotwin run` of a board: its files, its table, and runs that go on as if they had never stopped."""
 
 import json
+import re
 
 import pytest
 
@@ -159,7 +160,10 @@ def test_a_part_of_ones_own_is_run_and_its_failure_ends_the_run_in_one_line(miro
     own = tmp_path / "metronome.py"
     own.write_text(CLOCK)
     words = ("run", path, "--out", tmp_path / "out", "-q")
-    assert "parts.beat.part: 'metronome' is not one of the choices" in mirotwin.refuses(*words)
+    assert re.search(
+        r"parts\.beat\.part: 'metronome' is not one of the choices; .* by --part FILE\.py:CLASS",
+        mirotwin.refuses(*words),
+    )
     err = mirotwin.ends(2, *words, "--part", f"{own}:Metronome")
     assert "the run broke off after 2 control periods" in err
     assert "part 'beat' (metronome), tick 6000000: RuntimeError: worn out (" in err

@@ -81,6 +81,8 @@ def test_one_part_for_two_places_is_refused():
         ({"lit": FLAG, "dim": FLAG}, "STATE['dim'] = "),
         ({"lit": 5}, "STATE['lit'] = 5: "),
         ({"lit": ("zz", 0, 1)}, "STATE['lit'] = ('zz', 0, 1): "),
+        ({"lit": float}, "STATE['lit'] = float, which has no STATE; of a number it is "),
+        ({"lit": ("f", 0, 1)}, "STATE['lit'] = ('f', 0, 1); of a number it is "),
         (None, "TypeError: 'NoneType' object is not iterable"),
     ],
 )
