@@ -23,22 +23,22 @@ Parts = Annotated[tuple[str, ...], PART]
 _IN_FILE = re.compile(r"(.+?\.py):(\w+)", re.DOTALL)
 
 
-def bring_parts(given: Sequence[str]) -> None:
-    """Runs the files of --part; boards can name their parts until it is read again. Raises BadInput."""
+def bring_parts(given: Sequence[str], option: str = PART.names[0]) -> None:
+    """Runs the files of `option`; boards can name their parts until it is read again. Raises BadInput."""
     for name in PARTS.in_files:
         installed.in_files.pop((PARTS.word, name), None)
     PARTS.in_files.clear()
     for text in given:
         match = _IN_FILE.fullmatch(text)
         if match is None:
-            raise BadInput("", PART.names[0], f"{text!r} is not FILE.py:CLASS", "write it as sonar.py:Sonar")
+            raise BadInput("", option, f"{text!r} is not FILE.py:CLASS", "write it as sonar.py:Sonar")
         path, name = match[1], match[2]
-        struct = PARTS.of_file(path, name, PART.names[0])
-        with BadInput.at(path, f"{PART.names[0]} {name}"):
+        struct = PARTS.of_file(path, name, option)
+        with BadInput.at(path, f"{option} {name}"):
             check_struct(struct)
         tag = str(struct.__struct_config__.tag)
         if tag in PARTS.in_files:
-            raise BadInput(path, f"{PART.names[0]} {name}", f"there are two parts {tag!r}", "name one once")
+            raise BadInput(path, f"{option} {name}", f"there are two parts {tag!r}", "name one once")
         PARTS.in_files[tag] = struct
         sources = hashlib.sha256(Path(path).read_bytes()).hexdigest()[: installed.DIGITS]
         installed.in_files[PARTS.word, tag] = f"{Path(path).name}:{name}, sources {sources}"

@@ -168,6 +168,8 @@ def test_line(item: pytest.Item, seed: int) -> str:
     words = ["pytest", f"{file}::{name}", "--mirotwin-seed", str(seed)]
     if (firmware := path_option(item.config, "firmware")) is not None:
         words += ["--mirotwin-firmware", _relative(item.config, firmware)]
+    for part in item.config.getoption("--mirotwin-part"):
+        words += ["--mirotwin-part", part]
     for option in ("--mirotwin-port", "--mirotwin-allow-motion", "--mirotwin-max-speed"):
         if value := item.config.getoption(option):
             words += [option] if value is True else [option, f"{value}"]

@@ -22,6 +22,7 @@ _OPTIONS: tuple[tuple[str, str, type, str], ...] = (
     ("--mirotwin-seed", "N", int, "the seed of all tests"),
     ("--mirotwin-artifacts", "DIR", str, _INI["mirotwin_artifacts"]),
     ("--mirotwin-repeat", "N", int, _INI["mirotwin_repeat"]),
+    ("--mirotwin-part", "FILE.py:CLASS", list, "a part of your own that boards name"),
     ("--mirotwin-pages", "", bool, "make the page of each failed test, too: some seconds each"),
     ("--mirotwin-port", "URL", str, "run against the robots at this port, not against their twin"),
     ("--mirotwin-allow-motion", "", bool, "with a port: send what moves a robot"),
@@ -74,6 +75,13 @@ def check_options(config: pytest.Config) -> None:
             load_firmware(firmware)
         except ValueError as error:
             raise pytest.UsageError(f"--mirotwin-firmware: {error}") from None
+    if parts := config.getoption("--mirotwin-part"):
+        from mirotwin.shell.part_files import bring_parts
+
+        try:
+            bring_parts([f"{Path(config.invocation_params.dir, part)}" for part in parts], "--mirotwin-part")
+        except ValueError as error:
+            raise pytest.UsageError(f"{error}") from None
     workers = config.getoption("numprocesses", None) or 0
     if workers > 1 and config.getoption("--mirotwin-port"):
         raise pytest.UsageError(f"--mirotwin-port: {workers} workers cannot share one port; give -n 0")

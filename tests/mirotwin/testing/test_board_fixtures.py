@@ -128,3 +128,48 @@ def test_a_scenario_file_of_a_board_is_a_test(tmp_path):
     done = session(tmp_path, "-q")
     assert "step failed: step 3: wait_for text" in done.stdout
     assert "found nothing was sent" in done.stdout
+
+
+FLOOR = """
+from miro_robot.parts.keys import STRONG, PartKeys, Pin
+from miro_robot.parts.part import Part
+
+
+class Floor(PartKeys, frozen=True, kw_only=True, tag="floor"):
+    PINS = (Pin("out", STRONG),)
+    PUTS = {"dark": bool}
+    READS = {"dark": "whether it is"}
+
+    def make(self, place):
+        return FloorPart(self, place)
+
+
+class FloorPart(Part):
+    STATE = {"dark": "i"}
+
+    def __init__(self, keys, place):
+        super().__init__(keys, place)
+        self.dark = 0
+"""
+OWN_PART = """
+@pytest.mark.mirotwin(board="floor.board.toml", firmware="panel.ihx")
+def test_it_is_light(board):
+    board.put("floor.dark", True)
+    assert not board.value("floor.dark")
+"""
+
+
+def test_a_part_of_ones_own_is_named_by_an_option_and_again_in_the_line_that_repeats_the_test(tmp_path):
+    project(tmp_path).unlink()
+    (tmp_path / "floor.py").write_text(FLOOR)
+    (tmp_path / "floor.board.toml").write_text(
+        'crystal_hz = 12_000_000\n[parts.floor]\npart = "floor"\npins = { out = "P1.7" }\n'
+    )
+    done = session(tmp_path, tests=OWN_PART, child=True)
+    assert "'floor' is not one of the choices" in done.stdout
+    done = session(tmp_path, "--mirotwin-part=floor.py:Floor", child=True)
+    assert "--mirotwin-seed 0 --mirotwin-part floor.py:Floor" in done.stdout
+    done = session(tmp_path, "--mirotwin-part=floor.py:Flor", child=True)
+    assert (
+        "--mirotwin-part: there is no class 'Flor' derived from PartKeys; did you mean Floor?" in done.stderr
+    )
