@@ -149,6 +149,7 @@ def plain(line):
     """The words of a command, None for one that needs a shell."""
     lexer = shlex.shlex(line, posix=True, punctuation_chars=True)
     lexer.commenters = "#"
+    lexer.whitespace_split = True  # fan.py:Fan is one word
     words = list(lexer)
     return None if any(set(word) <= set("();<>|&") or set(word) & set("*?$`") for word in words) else words
 
