@@ -102,6 +102,15 @@ def test_a_value_that_no_file_can_hold_is_refused_before_it_is_saved(value):
         made.before_save()
 
 
+def test_an_event_later_than_never_is_refused_before_it_is_saved():
+    made = board()
+    made.parts[0].next_tick = (1 << 63) - 1
+    with pytest.raises(
+        PluginError, match=r"attribute 'next_tick' is 9223372036854775807: is .*, not from 0 to"
+    ):
+        made.before_save()
+
+
 def test_a_fault_of_no_kind_is_the_parts_error():
     class Finder(OwnPart):
         def due(self, tick):
