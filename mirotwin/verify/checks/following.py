@@ -5,6 +5,7 @@ from __future__ import annotations
 from typing import Any
 
 from miro_exact.clock import CYCLE_TICKS
+from miro_exact.plugins import PluginError
 from miro_robot.parts.resolve import resolve
 from miro_robot.parts.values import checked_read
 from miro_sim.scenario.board import BoardScenario
@@ -55,7 +56,11 @@ class Following:
             now = subject.cpu.cycles * CYCLE_TICKS
             value = self.changes.watch_value(condition.of, now)
             self.serial = self.changes.values.end
-            self.follower = condition.follower(condition.of, 0, self.clock, now, value)
+            try:
+                self.follower = condition.follower(condition.of, 0, self.clock, now, value)
+            except ValueError as error:  # a text is no number
+                what, _, remedy = f"{error}".partition("; ")
+                raise PluginError(what, remedy) from None
 
     def heard(self, event: Event) -> None:
         self.text.append((event.tick, 0, event.value))

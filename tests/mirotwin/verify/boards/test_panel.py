@@ -209,6 +209,10 @@ def test_a_check_without_an_occasion_has_not_passed(tmp_path):
         ('value_at_most = { "lamp.no" = 1 }', "of: lamp.no: part 'lamp' (led) has no value 'no'; use on or"),
         ('sends_text = { pattern = "(" }', "pattern: '(' is no regular expression"),
         ('never_happens = { condition = { event = "edge", pin = "X" }, until_tick = 9 }', "'X' is no pin"),
+        (
+            'happens = { condition = { event = "value", of = "lamp.flashes", contains = "x" }, until_tick = 9 }',
+            "check 'happens' cannot judge: of: lamp.flashes is no text; use above, below or equals",
+        ),
         ("settles_within_s = 1", ""),
     ],
 )
