@@ -28,7 +28,9 @@ from miro_sim.scenario.errors import ScenarioError
 from miro_sim.world.conditions import (
     Answer,
     Condition,
+    Duty,
     Followed,
+    Frequency,
     OfPin,
     Reached,
     WheelSpeeds,
@@ -220,13 +222,26 @@ class Player:
                 network=condition.network, slot=condition.slot, predicate=lambda robot: not holds(robot)
             )
             required = f"{condition}"
+        self._let_act()
         self._forget()
         until_tick = machine.tick + self.ticks(for_ms)
         event = self._next(forbidden, until_tick, [])
         if event is not None:
             raise _Failed(event.tick, f"{required} for {for_ms:g} ms", self._other(condition, event))
+        if isinstance(condition, Frequency | Duty) and not never and self.found.endswith("no period"):
+            raise _Failed(machine.tick, f"{required} for {for_ms:g} ms", self.found)
         if machine.tick < until_tick:
             raise _Failed(machine.tick, f"{for_ms:g} ms of it", self._end())
+
+    def _let_act(self) -> None:
+        """On to where the actions of the steps before have been done: what holds from now on is what they made."""
+        machine = self.machine
+        if isinstance(machine, World) and not self.hosts:  # a board
+            begun_tick, last_tick = machine.tick, machine.earliest_action_tick
+            ticks = [action.tick for line in machine.lines for action in line.actions.waiting]
+            done_tick = max((tick for tick in ticks if begun_tick <= tick <= last_tick), default=-1)
+            if done_tick >= 0:
+                machine.run_to(done_tick + 1)
 
     def _forget(self) -> None:
         """Passes over the events up to now."""

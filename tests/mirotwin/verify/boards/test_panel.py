@@ -110,6 +110,26 @@ FAILS = {
 }
 
 
+@pytest.mark.parametrize(
+    "step",
+    [
+        '{ hold = "frequency", pin = "P0.0", at_most_hz = 10, for_ms = 300 }',
+        '{ hold = "duty", pin = "P0.0", at_least = 0.4, for_ms = 100 }',
+    ],
+)
+def test_a_pin_that_stands_does_not_hold_a_duty_or_a_frequency(step, tmp_path):
+    result = outcome(tmp_path, READY + step)
+    assert result.verdict == "failed"
+    assert "found P0.0: no period" in result.lines[0]
+
+
+@pytest.mark.parametrize("verb", ['{ hold = "value", ', '{ never = "value", outside = true, '])
+def test_what_is_put_holds_from_then_on(verb, tmp_path):
+    put = "{ put = { key.pressed = true } },"
+    result = outcome(tmp_path, READY + put + verb + 'of = "key.pressed", equals = true, for_ms = 1 }')
+    assert result.verdict == "passed", result.lines
+
+
 @pytest.mark.parametrize("step", FAILS)
 def test_a_step_that_fails_says_what_was_there_and_leaves_a_case_with_this_verdict(step, tmp_path):
     result = outcome(tmp_path, READY + step, artifacts=tmp_path / "left")
