@@ -12,7 +12,7 @@
 
 A byte that is written while it is busy is lost and counted in `lost`; its halves count all the same. A pulse that
 breaks the bus timing is counted in `short_pulses` and taken all the same; of signals that change on the tick on which E
-falls, what they were before. From a processor of 12 ticks a cycle E is never too short below 52 MHz: what is left is
+falls, what they were before. From a processor of 12 ticks a cycle E is never too short below 48 MHz: what is left is
 RS, R/W or data that are written by the same instruction as E.
 
 A program that reads the busy flag while its port still drives data low works against the display's outputs: contention,
