@@ -6,6 +6,7 @@ import socket
 from selectors import DefaultSelector
 
 from mirotwin.ports.endpoint import PortContext
+from mirotwin.ports.radio_port import RadioPort
 from mirotwin.ports.rfc2217 import LONGEST_SUBOPTION, Rfc2217Endpoint
 from mirotwin.ports.sockets import TcpEndpoint
 from mirotwin.ports.terminal import PtyEndpoint
@@ -15,14 +16,19 @@ from tests.fuzz.target import Draws, Target, pieces
 class _Radio:
     """A radio's port that keeps what is sent. `room` is drawn; time stands, but for `world.tick`."""
 
+    baud = RadioPort.baud
+    takes, remark_on_sending = RadioPort.takes, RadioPort.remark_on_sending
+    deaf_to, mute_at = RadioPort.deaf_to, RadioPort.mute_at
+
     def __init__(self):
         self.world = self
+        self.clock = 24_000_000
         self.tick = self.free_tick = 0
         self.room = 4096
         self.sent = b""
         self.network = self.waiting = 0
 
-    def send(self, data, at_tick):
+    def send(self, data, at_tick=0, baud=0):
         assert 0 < len(data) <= self.room, f"{len(data)} bytes where there is room for {self.room}"
         self.sent += data
         return self.tick

@@ -136,7 +136,7 @@ def test_a_case_of_a_bare_processor_is_refused(mirotwin, tmp_path):
     case = tmp_path / "bare.stream"
     case.write_text("# mirotwin stream 2\n#: [bare]\n#: bit_ticks = 1152\n1000 > 61\n")
     err = mirotwin.refuses("replay", case, "--port", ROBOT, "--firmware", CASES / "jumps-out.ihx")
-    assert err == f"{case}: --port: is not for a case of a bare processor; leave it out"
+    assert err == f"{case}: --port: is for robots, and this is for a board; leave it out"
 
 
 MOVED = {"left moved", "right moved"}

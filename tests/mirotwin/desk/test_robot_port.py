@@ -24,7 +24,7 @@ from miro_protocol.decoder import Decoder
 from miro_protocol.events import Received
 from miro_protocol.frames import TeamFrame, TelemetryFrame, encode
 from miro_protocol.transmission import Transmission
-from miro_sim.world.conditions import CONDITIONS, Answer, Heard, Sent
+from miro_sim.world.conditions import CONDITIONS, Answer, Heard, Sent, Text
 from miro_sim.world.machine import NotObservable
 from mirotwin import Telemetry
 from mirotwin.desk import robot_port
@@ -369,8 +369,8 @@ def test_characters_that_come_faster_than_the_line_carries_them_are_left_out(pty
 
 
 def test_what_is_inside_a_robot_is_refused_with_the_reason():
-    inside = [kind for kind in CONDITIONS.values() if kind not in (Answer, Heard, Sent)]
-    needed = {"pin": "txd", "address": 0, "left_m_s": 0.0}
+    inside = [kind for kind in CONDITIONS.values() if kind not in (Answer, Heard, Sent, Text)]
+    needed = {"pin": "txd", "address": 0, "left_m_s": 0.0, "level": 0, "of": "eyes.distance_cm", "above": 0.0}
     with robots_at(ROBOT) as port:
         for kind in inside:
             fields = {key: value for key, value in needed.items() if key in kind.__struct_fields__}

@@ -133,7 +133,10 @@ def test_a_case_of_a_bare_processor_is_not_played_on_the_robot(mirotwin, engines
         (("replay", case), needs),
         (("replay", case, *firmware, "--seed", "1"), "--seed: is not for a case of a bare"),
         (("replay", case, *firmware, "--set", "duration_s=1"), "is not for a case of a bare"),
-        (("replay", case, *firmware, "--port", "/dev/null"), "--port: is not for a case of a bare"),
+        (
+            ("replay", case, *firmware, "--port", "/dev/null"),
+            "--port: is for robots, and this is for a board",
+        ),
         (("report", case, "--firmware", hexes["sleeps"]), "is for a board alone, which has no robot to show"),
     ):
         code, _, err = mirotwin(*arguments)
