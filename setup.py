@@ -56,8 +56,8 @@ SSE = ["-msse2", "-mfpmath=sse"] if sys.maxsize < 1 << 32 and platform.machine()
 SCALAR = ["-fno-tree-slp-vectorize", *SSE]
 HOTTEST = re.compile(
     r"miro_exact\.(dmath|memory|rng)|miro_host\.eye\.regions"
-    r"|miro_robot\.(board|wired_board|parts\.(nets|part|led)|harness\.(fast_oracle|harness)|lm629\.(bus_timing|chip|encoder|pid))"
-    r"|miro_robot\.(wired_board|parts\.(lm629|nets|part))"
+    r"|miro_robot\.(board|wired_board|parts\.(led|lm629|nets|part))"
+    r"|miro_robot\.(harness\.(fast_oracle|harness)|lm629\.(bus_timing|chip|encoder|pid))"
     r"|miro_robot\.mcs51\.(chip|cpu|interrupts|line|peripherals|timers|uart)"
     r"|miro_sim\.pitch\.(camera|rays|scene|sensor)|miro_sim\.plant\.(chassis|differential_drive|drive|rough)"
 )
