@@ -30,7 +30,7 @@ def names_on(board: ProcessorBoard) -> list[str]:
 
 
 def value_on(board: ProcessorBoard, name: str) -> Value | None:
-    """What a name means on it; None for what is no part and no net."""
+    """The part or the net of this name; None if the board has neither."""
     if not isinstance(board, WiredBoard):
         return None
     if name == "parts":

@@ -267,8 +267,11 @@ class Debugger:
         """On to an event; what it says of itself."""
         event = self.timeline.until(condition)
         if event is not None:
-            tick, place, what = str(event).split(": ", 2)
-            return f"{tick}: {what}" if self.timeline.core.robot is None else f"{tick}: {place}: {what}"
+            text = str(event)
+            if self.timeline.core.robot is not None:
+                return text
+            tick, _, text = text.split(": ", 2)  # a board alone is the only place
+            return f"{tick}: {text}"
         return "no such event before the end" if self.timeline.run.over else INTERRUPTED
 
     def until_true(self, text: str) -> str:

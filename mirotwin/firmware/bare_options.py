@@ -60,7 +60,7 @@ BAUD = Option(
 
 
 class BareOptions(Options, frozen=True, kw_only=True):
-    """What the command line says about the bare processor, or about the board that is around it."""
+    """The options for a bare processor, or for the board of a board file."""
 
     HEADING = "Image on the bare processor, or on a board"
 

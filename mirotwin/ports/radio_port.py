@@ -23,7 +23,7 @@ class RadioPort:
     """The port of `network`. Raises ValueError for a network that is not there."""
 
     baud = 9600
-    """Of a terminal that nobody has set otherwise."""
+    """The rate of the terminal until a program sets another."""
 
     def __init__(self, world: World, network: int = 0) -> None:
         world.earliest_tick(network)  # refuses a network that is not there

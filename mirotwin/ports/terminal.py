@@ -74,7 +74,7 @@ class PtyEndpoint(Endpoint):
 
     @property
     def baud(self) -> int:
-        """What the program has set; 0 while nobody has, where a terminal does not have the rate of the line."""
+        """The rate that a program has set. 0: no program has set one, and the terminal began with another rate."""
         rate = self._termios.tcgetattr(self._master)[5]
         if not self._default_rate and rate == self._termios.B9600:
             return 0

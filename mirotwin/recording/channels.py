@@ -347,10 +347,10 @@ def action(network: int, message: ActionMessage) -> Action:
 
 def put(network: int, message: PutMessage) -> Put:
     """The put of a message. Raises ValueError for a message that cannot be."""
-    found = Put(message.tick, network, message.slot, message.path, message.value)
+    action = Put(message.tick, network, message.slot, message.path, message.value)
     if not 0 <= message.tick <= MAX_TICK or message.slot < 0 or not PUT_PATH.fullmatch(message.path):
-        raise ValueError(f"{found.text} at tick {message.tick}")
-    return found
+        raise ValueError(f"{action.text} at tick {message.tick}")
+    return action
 
 
 def transmission(network: int, message: WireMessage) -> Transmission:

@@ -224,8 +224,8 @@ def _drive(nets: dict[str, str], pin: str, source: str, place: str) -> None:
 
 
 def check_no_wiring(table: dict[str, Any]) -> None:
-    """Refuses a wiring file of before. Raises WiringError."""
+    """Refuses an old wiring file. Raises WiringError."""
     for key in ("data", "latch", "buffer"):
         if key in table:
-            what = "this is a wiring file of before, not a board file"
+            what = "this is an old wiring file, not a board file"
             raise WiringError("", key, what, "write its parts as `mirotwin boards show miro` does")

@@ -193,7 +193,7 @@ def test_a_board_is_called_as_its_file_or_as_it_says(tmp_path):
         ("xram_bytes = 9\n" + HEAD, """xram_bytes: the board's xram is 'none'; give xram = "external", too"""),
         ("crystl_hz = 1", "crystl_hz: unknown key; did you mean crystal_hz?"),
         (HEAD + "[serial]\nbaud = 400_000", "serial.baud: 400000 is out of range; must be <= 345600 with this"),
-        ('data = "P0"\n' + HEAD, "data: this is a wiring file of before, not a board file"),
+        ('data = "P0"\n' + HEAD, "data: this is an old wiring file, not a board file"),
         (HEAD + '[parts.a]\npart = "led"\npins = { pin = "P5.0" }', "parts.a.pins.pin: there is no port pin P5.0"),
         (HEAD + "[parts.a]\npins = {}", "parts.a.part: this key is missing; say which part it is"),
         (HEAD + '[parts.a]\npart = "ledd"', "parts.a.part: 'ledd' is not one of the choices; did you mean led?"),

@@ -80,7 +80,7 @@ def test_more_buffers_than_fit_are_refused_and_not_left_out(tmp_path):
         ("[parts.left]", "[parts.other]\npart = 'led'\n[parts.left]", None),
         ('part = "lm629"\n[parts.left.pins]', "part = 'led'\n[parts.left.pins]", "parts.left: the fast board has two"),
         ("24_000_000", "12_000_000", "crystal_hz: the fast board has 24000000 only"),
-        ('chip = "at89c52"', 'data = "P0"', "data: this is a wiring file of before, not a board file; write its parts"),
+        ('chip = "at89c52"', 'data = "P0"', "data: this is an old wiring file, not a board file; write its parts"),
     ],
 )  # fmt: skip
 def test_what_the_fast_board_cannot_be_is_one_line(tmp_path, old, new, message):
