@@ -9,6 +9,11 @@ MOST_NETS = 256
 MOST_PARTS = 64
 
 
+def port_pin(number: int) -> str:
+    """Port pin `8 * port + bit`, as `P1.0`."""
+    return f"P{number >> 3}.{number & 7}"
+
+
 class PartPin(msgspec.Struct, frozen=True):
     """A pin of a part on net `net`, -1 if it is not connected; `inverted`: behind an inverter."""
 

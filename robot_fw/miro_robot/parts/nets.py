@@ -31,7 +31,7 @@ from miro_exact.domain import DomainError
 from miro_exact.plugins import PluginError
 from miro_exact.raised import raised
 from miro_robot.parts.keys import IN, LOW, MOST_PINS, OPEN_DRAIN, RELEASED, STRONG, TWO_WAY
-from miro_robot.parts.netlist import MOST_PARTS, PORT_PINS, Netlist
+from miro_robot.parts.netlist import MOST_PARTS, PORT_PINS, Netlist, port_pin
 from miro_robot.parts.part import Part
 
 MOST_WAVES = 1000
@@ -158,7 +158,7 @@ class Nets:
         for number in range(PORT_PINS):
             if self.ports[number] < 0:
                 self.ports[number] = len(self.all_names)
-                self.all_names.append(_port_pin(number))
+                self.all_names.append(port_pin(number))
             else:
                 self.wired[number >> 3] |= 1 << (number & 7)
             net = self.ports[number]
@@ -236,22 +236,23 @@ class Nets:
 
     def is_output(self, net: int) -> bool:
         """Whether something else than a port can drive a net."""
-        kinds = [
-            self.parts[self.pin_part[place]].keys.PINS[self.pin_number[place]].kind
-            for place in range(self.first[net], self.first[net + 1])
-        ]
+        kinds = self._kinds(net)
         tied = (*self.netlist.highs, *self.netlist.lows, *self.netlist.pull_downs, *self.latch_nets)
         return net in tied or kinds.count(IN) < len(kinds)
 
     def _may_contend(self, net: int, netlist: Netlist) -> bool:
         """Whether a strong high and a strong low may meet on a net: then the CPU has to be there when they do."""
-        kinds = [
-            self.parts[self.pin_part[place]].keys.PINS[self.pin_number[place]].kind
-            for place in range(self.first[net], self.first[net + 1])
-        ]
+        kinds = self._kinds(net)
         both = sum(kind in (STRONG, TWO_WAY) for kind in kinds) + self.latch_nets.count(net)
         lows = kinds.count(OPEN_DRAIN) + netlist.lows.count(net)
         return both + netlist.highs.count(net) > 0 and both + lows + netlist.highs.count(net) > 1
+
+    def _kinds(self, net: int) -> list[int]:
+        """Kinds of the pins of parts on a net."""
+        return [
+            self.parts[self.pin_part[place]].keys.PINS[self.pin_number[place]].kind
+            for place in range(self.first[net], self.first[net + 1])
+        ]
 
     # Beginning, and going on from a saved state
 
@@ -303,7 +304,7 @@ class Nets:
         if name in self.all_names:
             return self.all_names.index(name)
         for number in range(PORT_PINS):
-            if name == _port_pin(number):
+            if name == port_pin(number):
                 return self.ports[number]
         for index, part in enumerate(self.parts):
             for pin, on_part in enumerate(part.keys.PINS):
@@ -652,7 +653,7 @@ class Nets:
     def drivers(self, net: int) -> list[str]:
         """Who drives a net strongly, by name."""
         there = [
-            _port_pin(number)
+            port_pin(number)
             for number in range(PORT_PINS)
             if self.ports[number] == net and not self._latched(number)
         ]
@@ -691,7 +692,3 @@ class Nets:
 
     def __repr__(self) -> str:
         return f"Nets({self.count} nets, {self.part_count} parts)"
-
-
-def _port_pin(number: int) -> str:
-    return f"P{number >> 3}.{number & 7}"

@@ -36,11 +36,6 @@ class BoardError(BadInput):
     """A board that cannot be built: file, key, what, remedy."""
 
 
-def port_pin(number: int) -> str:
-    """Port pin `8 * port + bit`, as `P1.0`."""
-    return f"P{number >> 3}.{number & 7}"
-
-
 class _Wire(msgspec.Struct):
     """Who is on a net. `pins`: part, number of its pin, and whether it is behind an inverter."""
 
