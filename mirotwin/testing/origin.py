@@ -5,6 +5,7 @@ No package index has Mirotwin: pip would install whatever a stranger registers u
 
 from __future__ import annotations
 
+import os
 import re
 from importlib import metadata
 from pathlib import Path
@@ -43,7 +44,7 @@ def given(source: str, project: Path) -> str:
     if _ADDRESS.fullmatch(source):
         return f"{PACKAGE} @ {source}"
     path = Path(source)
-    if not path.exists():
+    if not os.path.exists(path):  # unlike Path.exists, it raises nothing for a name that is too long
         raise BadInput(
             shortened(source), "--from", "is no address, and there is no such file or folder", _REMEDY
         )
@@ -64,7 +65,7 @@ def installed(project: Path) -> str | None:
         address = f"{origin.vcs_info.vcs}+{origin.url}@{origin.vcs_info.commit_id}{inner}"
     elif origin.url.startswith("file:"):
         path = Path(url2pathname(urlsplit(origin.url).path))
-        return _of_path(path, project) if path.exists() else None
+        return _of_path(path, project) if os.path.exists(path) else None
     else:
         address = f"{origin.url}{inner}"
     return f"{PACKAGE} @ {address}" if _ADDRESS.fullmatch(address) else None

@@ -106,6 +106,11 @@ def test_a_checkout_is_a_source_and_any_other_folder_is_none(tmp_path):
     assert origin.given(str(tmp_path), tmp_path / "mine") == f"mirotwin[report] @ {tmp_path.as_uri()}"
 
 
+def test_a_name_that_no_file_can_have_is_refused_like_one_that_no_file_has(tmp_path):
+    with pytest.raises(BadInput, match="--from: is no address, and there is no such file or folder"):
+        origin.given("a" * 300, tmp_path)
+
+
 @given(st.text() | st.from_regex(r"(git\\+)?https?://\\S*", fullmatch=True))
 def test_whatever_is_given_is_one_line_with_an_address_or_refused(tmp_path_factory, source):
     try:
