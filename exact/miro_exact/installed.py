@@ -126,7 +126,7 @@ def sources_hash(entry: EntryPoint) -> str:
 def _sources(entry: EntryPoint) -> dict[str, Path]:
     """Path below the folder of a top-level module or package -> file."""
     files: dict[str, Path] = {}
-    with suppress(AttributeError):  # of an entry point that names no module
+    with suppress(AttributeError, ValueError):  # of an entry point that names no module
         files |= _files_of_module(entry.module)
     if entry.dist is not None:
         for module in sorted(_top_level(entry.dist)):

@@ -6,7 +6,7 @@ from importlib.machinery import EXTENSION_SUFFIXES
 
 import pytest
 
-from miro_exact.installed import described, differences
+from miro_exact.installed import described, differences, entries_of
 from tests.exact.distribution import install
 
 PARTS = {"steady": "plug_steady:Parameters"}
@@ -138,6 +138,19 @@ def test_an_entry_point_that_cannot_be_loaded_is_described_too(site):
     install(site, "steady-law", "1.2", parts, plug_steady="raise RuntimeError")
     for name in parts:
         assert described("law", name).startswith(f"law {name}: steady-law 1.2, sources ")
+
+
+@pytest.mark.parametrize("error", [AttributeError, ValueError])
+def test_an_entry_point_without_a_module_is_described_whatever_its_library_raises(site, monkeypatch, error):
+    """`importlib.metadata` raises AttributeError; the package `importlib_metadata`, once imported, ValueError."""
+
+    def module(entry):
+        raise error
+
+    install(site, "steady-law", "1.2", {"odd": "1 + 1"})
+    (entry,) = entries_of("mirotwin.laws", "odd")
+    monkeypatch.setattr(type(entry), "module", property(module))
+    assert described("law", "odd").startswith("law odd: steady-law 1.2, sources ")
 
 
 def test_what_differs_from_a_recording_is_a_line_each(site):
