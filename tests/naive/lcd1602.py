@@ -67,6 +67,13 @@ class Lcd:
             return bits
         return [None] * 4 + (bits[:4] if self.halves else bits[4:])
 
+    def driven(self, tick, before):
+        """What it puts on the data wires itself; the busy flag may fall on the tick on which E does, and is first."""
+        now, self.pins = self.pins, before
+        levels = {f"d{bit}": level for bit, level in enumerate(self.output(tick)) if level is not None}
+        self.pins = now
+        return levels
+
     def step(self, tick, pins, touched=()):
         """`touched`: pins that have moved on this tick and may be back where they were."""
         before, self.pins = self.pins, pins
@@ -80,7 +87,7 @@ class Lcd:
             self.broken += bool(late or fast)
             self.rise = tick
         elif "e" in changed and self.rise is not None:
-            self.fall(tick, before, {*changed} - {"e"})
+            self.fall(tick, {**before, **self.driven(tick, before)}, {*changed} - {"e"})
         elif "e" in changed:
             self.rise = -(10**9)  # it was high from power-on on
         for name in (*changed, *touched):

@@ -213,6 +213,17 @@ def test_a_display_that_was_initialized_does_so(steps):
     play(begun(), steps)
 
 
+def test_a_busy_flag_that_falls_with_e_is_half_a_byte_that_was_read_clear():
+    """Four wires; E falls a tick after the instruction before is over, on the very tick, and a tick before."""
+    for late in (1, 0, -1):
+        display = begun()
+        play(display, [("byte", 0x20, 1776 - 61 + late, {"rs": 0, "rw": 0})])
+        display.step(20, rw=1)
+        display.step(20, e=1)
+        display.step(21, e=0)
+        play(display, [("byte", 0x35, 2000, {"rs": 1, "rw": 0})])
+
+
 def drawn(seed):
     """Steps of both kinds that depend on nothing but a number."""
     dice = random.Random(seed)
