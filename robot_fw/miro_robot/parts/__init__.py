@@ -4,6 +4,7 @@ ELECTRONICS = {
     "at24c": "miro_robot.parts.at24c:At24c",
     "button": "miro_robot.parts.button:Button",
     "buzzer": "miro_robot.parts.buzzer:Buzzer",
+    "hc595": "miro_robot.parts.hc595:Hc595",
     "hc_sr04": "miro_robot.parts.hc_sr04:HcSr04",
     "l293d": "miro_robot.parts.l298:L293d",
     "l298": "miro_robot.parts.l298:L298",
@@ -11,6 +12,7 @@ ELECTRONICS = {
     "lcd2004": "miro_robot.parts.lcd1602:Lcd2004",
     "led": "miro_robot.parts.led:Led",
     "lm629": "miro_robot.parts.lm629:Lm629Keys",
+    "relay": "miro_robot.parts.relay:Relay",
     "servo": "miro_robot.parts.servo:Servo",
 }
 """Name to the struct of its keys. Parts that move are the physical world's."""

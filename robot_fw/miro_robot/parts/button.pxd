@@ -9,5 +9,6 @@ cdef class ButtonPart(Part):
     cdef public int pressed, closed, bounces
     cdef public long long changes, settles_tick
 
+    cdef _press(self, int pressed, long long tick)
     cdef _contact(self, int closed)
     cdef _bounce_on(self, long long tick)

@@ -6,7 +6,7 @@ pin --o/ o-- VCC       needs a resistor to ground: `pull_downs`
 
 from __future__ import annotations
 
-from typing import Annotated, Any, Literal
+from typing import Annotated, Any, ClassVar, Literal
 
 from msgspec import Meta
 
@@ -25,7 +25,7 @@ class Button(PartKeys, frozen=True, kw_only=True, tag="button"):
     the button's name and the number of the change only; 0: never. A switch is a button that is left pressed.
     """
 
-    PINS = (Pin("pin", STRONG),)
+    PINS: ClassVar[tuple[Pin, ...]] = (Pin("pin", STRONG),)
     PUTS = {"pressed": bool}
     READS = {"pressed": "whether it is pressed", "closed": "whether its contact is closed"}
     SHEET = (
@@ -72,8 +72,10 @@ class ButtonPart(Part):
         self.drive(0, self.made if closed else RELEASED)
 
     def put(self, name: str, value: Any, tick: int) -> None:
+        self._press(1 if value else 0, tick)
+
+    def _press(self, pressed: int, tick: int) -> None:
         """A press that is as before changes nothing; one during a bounce ends that bounce."""
-        pressed = 1 if value else 0
         if pressed == self.pressed:
             return
         self.pressed = pressed
