@@ -1,4 +1,4 @@
-"""A target that is any 8051 firmware with a serial port, on a processor with 64 KB of RAM and nothing else.
+"""A target that is any 8051 firmware with a serial port, on a processor with 64 KB of RAM, or on a board with parts.
 
 Where the firmware sleeps when it has nothing to do, a run ends when it sleeps and has sent all it had; where it polls
 for ever, 10 ms (at 24 MHz) after the last character, unless a time is given.
@@ -10,27 +10,34 @@ from collections.abc import Sequence
 from operator import attrgetter
 from typing import Any
 
+from msgspec.structs import replace
+
 from miro_exact.bad_input import BadInput
 from miro_exact.clock import CHARACTER_BITS, CYCLE_TICKS
 from miro_exact.raised import raised
-from miro_protocol.actions import ScriptItem
+from miro_protocol.actions import Put, ScriptItem
 from miro_protocol.protocol import Protocol
 from miro_protocol.transmission import Transmission
-from miro_robot.board_spec import CRYSTAL_HZ, BoardSpec
+from miro_robot.board_spec import CRYSTAL_HZ
 from miro_robot.harness.harness import AWAKE, SETTLE_TICKS, Harness
 from miro_robot.harness.program import INPUTS, Program
-from miro_robot.harness.recording_bus import LONGEST_ANSWER_TICKS, BareOracle
+from miro_robot.harness.recording_bus import LONGEST_ANSWER_TICKS
 from miro_robot.image import SPACE_BYTES, Image
-from miro_sim.scenario.board import BoardScenario
+from miro_robot.mcs51.chips import CHIPS
+from miro_sim.scenario.board_scenario import board_of_tables
 from miro_sim.world.events import Event
-from mirotwin.fuzz.processor import BOOT_MS, Processor, bit_ticks_of
+from mirotwin.fuzz.processor import BOOT_MS, bit_ticks_of, powered
 from mirotwin.fuzz.protocols import called, protocol_named, shown
 from mirotwin.fuzz.spec import TargetSpec
 from mirotwin.fuzz.target import NEVER_SLEEPS, Target, TargetFailure, described
+from mirotwin.fuzz.wired import WiredMachine
 from mirotwin.shell.firmware_image import load_firmware
-from mirotwin.verify.checks.interface import Check, Failure, Subject, checked_monitor
+from mirotwin.shell.part_files import bring_parts
+from mirotwin.verify.checks.expect import checks_of_table
+from mirotwin.verify.checks.interface import Check, Failure, Monitor, Subject, at, checked_monitor
 from mirotwin.verify.checks.serial import Character, SerialMonitor
-from mirotwin.verify.expectations import checks_alone
+from mirotwin.verify.expectations import as_settings, checks_alone
+from mirotwin.verify.steps.reading import steps_of
 
 NO_FAULT = "no_fault"
 NO_FAULT_CODE, NEVER_SLEEPS_CODE, CHECK_CODE = 1, 2, 3
@@ -45,7 +52,8 @@ class BoardTarget(Target):
 
     `protocol` makes frames of bodies; without it they are sent as they are. `checks` judge each run, `baud` 0 takes the
     rate of the receiver, `after_ticks` is how long a run goes on after its last character. `run(data)` returns 0 or
-    what `failure` is: a fault, no sleep, what a check says. Raises BadInput where the firmware does not come up.
+    what `failure` is: a fault, no sleep, what a check says. `machine`: a board with parts, which is up, in the place of
+    the bare processor. Raises BadInput where the firmware does not come up.
     """
 
     def __init__(
@@ -58,33 +66,37 @@ class BoardTarget(Target):
         baud: int = 0,
         boot_ms: int = BOOT_MS,
         after_ticks: int | None = None,
+        machine: WiredMachine | None = None,
     ) -> None:
         if input not in INPUTS:
             raise BadInput("", "--input", f"{input!r} is no class of inputs", f"use {', '.join(INPUTS)}")
         self.protocol = protocol
-        self.processor = Processor(image)
-        try:
-            board = BoardSpec(crystal_hz=crystal_hz, bound_stack=False)
-        except ValueError as error:
-            raise BadInput("", "--crystal", str(error)) from None
-        self.processor.start_up(crystal_hz, boot_ms)
-        bit_ticks = bit_ticks_of(self.processor, crystal_hz, baud, boot_ms)
-        begin_tick = CYCLE_TICKS * self.processor.cpu.cycles
-        self.scenario = BoardScenario(board=board, bit_ticks=bit_ticks, begin_tick=begin_tick)
-        self.subject = Subject(self.processor, image, begin_tick, clock=crystal_hz, begin_tick=begin_tick)
+        self.wired = machine
+        self.machine = machine or powered(image, crystal_hz, boot_ms)
+        self.scenario = self.machine.scenario
+        clock, bit_ticks = self.scenario.clock, 0 if baud else self.scenario.host_bit_ticks
+        if not bit_ticks:
+            bit_ticks = bit_ticks_of(self.machine, clock, baud, boot_ms)
+        begin_tick = CYCLE_TICKS * self.machine.cpu.cycles
+        self.scenario = replace(self.scenario, bit_ticks=bit_ticks, begin_tick=begin_tick)
+        self.subject = Subject(self.machine.device, image, begin_tick, clock=clock, begin_tick=begin_tick)
         self.checks = checks
         for check in checks:
             _refuse_unseen(check, self.subject)
-        self.oracle = BareOracle(self.processor.bus, self.processor.cpu)
+        self.oracle = self.machine.oracle
         after = -1 if after_ticks is None else after_ticks
-        harness = Harness(self.processor, self.processor.cpu, self.oracle, bit_ticks, after_ticks=after)
+        state, cpu = self.machine.board, self.machine.cpu
+        harness = Harness(state, cpu, self.oracle, bit_ticks, after_ticks=after, device=machine)
         program = Program(
             INPUTS.index(input),
             repair=lambda body: self._repaired(body, self.program.frames),
             character_ticks=CHARACTER_BITS * bit_ticks,
+            choices=0 if machine is None else len(machine.choices),
         )
         super().__init__(image, harness, program)
         self.code = 0
+        self.left_out: dict[str, str] = {}  # checks that fail without any input, and why
+        self.monitors: list[Any] = []
         self._wrong: Failure | None = None
 
     def _repaired(self, body: bytes, number: int | None = None) -> bytes:
@@ -95,6 +107,9 @@ class BoardTarget(Target):
         return called(protocol.repair, lambda: bytes(memoryview(protocol.repair(body, number))))
 
     def run(self, data: Any) -> int:
+        if self.checks and self.wired is not None:  # monitors of pins and values look on from the beginning
+            self.harness.back()
+            self.monitors = [self._monitor(check) for check in self.checks]
         ended = self.play(data)
         self.code = NO_FAULT_CODE if self.oracle.code else 0
         if ended == AWAKE and not self.code:
@@ -107,20 +122,33 @@ class BoardTarget(Target):
     def _judged(self) -> Failure | None:
         """The failure of a check. A check that raises has failed, too: its error comes when the crash is confirmed."""
         tick = self.end_tick()
-        for check in self.checks:
+        if self.wired is None:
+            self.monitors = [self._monitor(check) for check in self.checks]
+        for check, monitor in zip(self.checks, self.monitors, strict=True):
             try:
-                monitor: Any = check.monitor(self.subject)
+                if isinstance(monitor, Failure):
+                    return monitor
                 self._feed(monitor)
                 monitor.end(tick)
             except (Exception, SystemExit) as error:
-                return Failure(check.name, 0, 0, tick, "", raised(error), alone_hz=self.subject.clock)
+                return self._raised(check, error)
             if monitor.failures:
                 return monitor.failures[0]  # type: ignore[no-any-return]
         return None
 
+    def _monitor(self, check: Check) -> Any:
+        try:
+            return check.monitor(self.subject)
+        except (Exception, SystemExit) as error:
+            return self._raised(check, error)
+
+    def _raised(self, check: Check, error: BaseException) -> Failure:
+        hertz = self.subject.clock
+        return Failure(check.name, 0, 0, self.end_tick(), "", raised(error), alone_hz=hertz)
+
     def _feed(self, monitor: Any) -> None:
         """Tells a monitor what the serial port took and gave in the last run, and of the last reset."""
-        bus = self.processor.bus
+        bus = self.machine
         # Without events where it can be: they take longer to make than a short run.
         if type(monitor).event is SerialMonitor.event:
             monitor.received = [Character(value, tick, bool(stop)) for value, stop, tick in bus.heard]
@@ -131,6 +159,7 @@ class BoardTarget(Target):
                 for value, stop, tick in bus.heard
             ]
             events += [Event(tick=tick, what="transmitted", slot=0, value=value) for value, tick in bus.said]
+            events += [Event(tick=tick, what="heard", value=value) for value, tick in bus.to_pc]
             for event in sorted(events, key=_BY_TICK):
                 if event.what in monitor.EVENTS:
                     monitor.event(event)
@@ -139,14 +168,14 @@ class BoardTarget(Target):
 
     def _awake(self) -> int:
         """Firmware that waits for its transmitter is awake, and no worse for it: as long as it sends, it may go on."""
-        cpu, bus = self.cpu, self.processor.bus
+        cpu, bus = self.cpu, self.machine
         end = 12 * cpu.cycles + LONGEST_ANSWER_TICKS
         sent = -1
         while sent != len(bus.said) and 12 * cpu.cycles < end:
             sent = len(bus.said)
             idle = cpu.idle_cycles
-            cpu.run(cpu.cycles + SETTLE_TICKS // 12)
-            if bus.fault_kind:
+            bus.run(self.end_tick() + SETTLE_TICKS)
+            if bus.fault() is not None:
                 return NO_FAULT_CODE
             if cpu.idle_cycles > idle:
                 return 0
@@ -157,7 +186,7 @@ class BoardTarget(Target):
 
     @property
     def failure(self) -> TargetFailure | None:
-        fault = self.processor.fault()
+        fault = self.machine.fault()
         if self.code == NO_FAULT_CODE and fault is not None:
             return TargetFailure(NO_FAULT, fault.tick, fault.pc, str(fault))
         if self.code == NEVER_SLEEPS_CODE:
@@ -167,6 +196,10 @@ class BoardTarget(Target):
         if self.code == CHECK_CODE and self._wrong is not None:
             return TargetFailure(self._wrong.check, self.end_tick(), 0, self._wrong.what)
         return None
+
+    def put_at(self, tick: int, which: int, value: int) -> Put:
+        assert self.wired is not None
+        return self.wired.put_at(tick, which, value)
 
     def describe(self, data: bytes) -> str:
         return "\n".join(self._line(one) for one in self.script(data))
@@ -192,6 +225,14 @@ class BoardTarget(Target):
             each = [frame_input(body, self.input) for body in samples]
         return list(dict.fromkeys([*each, b"".join(each)]))
 
+    def note(self) -> str:
+        """From when on inputs are played, for people."""
+        if self.wired is None:
+            return ""
+        begin_tick, clock = self.harness.begin_tick, self.scenario.clock
+        values = ", ".join(path for path, _ in self.wired.choices) or "no values"
+        return f"inputs begin at {at(begin_tick, clock)}: {self.wired.how}; they put {values}"
+
     def __repr__(self) -> str:
         return f"BoardTarget({self.image.path}, input={self.input!r}, {self.scenario})"
 
@@ -202,6 +243,19 @@ def _refuse_unseen(check: Check, subject: Subject) -> None:
     if unseen:
         reason = f"{check.name} judges by {', '.join(unseen)}, which only a whole run shows"
         raise BadInput("", "--expect-all", reason, "leave it out: each input that is new is judged so")
+
+
+def seen_in_target(checks: Sequence[Check], subject: Subject) -> list[Check]:
+    """The checks that need no World: they judge by characters, memories, pins and values."""
+    seen = []
+    for check in checks:
+        monitor = checked_monitor(check, subject)
+        later = any(
+            getattr(type(monitor), name) is not getattr(Monitor, name) for name in ("period", "period_over")
+        )
+        if not later and all(event in (*_SEEN, "heard") for event in monitor.EVENTS):
+            seen.append(check)
+    return seen
 
 
 def frame_input(body: bytes, input: str) -> bytes:
@@ -221,3 +275,32 @@ def board_target(spec: TargetSpec) -> BoardTarget:
         after_ticks=spec.after_ticks,
         **spec.parameters,
     )
+
+
+def wired_target(spec: TargetSpec) -> BoardTarget:
+    """The target of a specification with a board. `parameters`: `tables`, the scenario; `steps`, how many of its steps
+    bring the board up; `boot_ms`; `parts`, FILE.py:CLASS. Raises BadInput.
+    """
+    tables, steps, boot_ms, parts = (
+        spec.parameters.get(key) for key in ("tables", "steps", "boot_ms", "parts")
+    )
+    bring_parts(parts or ())
+    as_settings(spec.expected)  # checks in files are known by their names from here on
+    scenario = board_of_tables(dict(tables or {}), "").scenario
+    image = load_firmware(spec.image, CHIPS[scenario.board.chip].flash_bytes, named=False)
+    machine = WiredMachine(scenario, image, steps_of(scenario, "")[: steps or 0], boot_ms or 0)
+    target = BoardTarget(
+        image,
+        spec.input,
+        protocol_named(spec.protocol) if spec.protocol else None,
+        baud=spec.baud,
+        after_ticks=spec.after_ticks,
+        machine=machine,
+    )
+    wanted = checks_of_table(scenario, "", "expect", scenario.expect).values()
+    target.checks = seen_in_target([check for check in wanted if check is not None], target.subject)
+    while target.run(b"") == CHECK_CODE and target.failure is not None:
+        failed = target.failure
+        target.left_out[failed.check] = failed.what
+        target.checks = [check for check in target.checks if check.name != failed.check]
+    return target

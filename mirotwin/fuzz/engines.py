@@ -33,7 +33,7 @@ def engine_for(
     """AFL++, or Hypothesis, with a note for the user about it. Raises BadInput where neither can run."""
     seeds, dictionary = folder.folder("seeds"), folder.path / "dictionary"
     write_seeds(seeds, inputs)
-    if spec.board == "bare":
+    if spec.board != "miro":
         tokens = [data[:_TOKEN] for data in inputs[:_TOKENS]]
     else:
         tokens = wire_tokens(spec.robots) if spec.input == "bytes" else message_tokens(spec.robots)

@@ -8,6 +8,7 @@ from __future__ import annotations
 import time
 from collections.abc import Iterable, Mapping
 from contextlib import suppress
+from itertools import takewhile
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any, Literal, Self, cast
 
@@ -20,9 +21,11 @@ from miro_exact.plugins import PluginError
 from miro_robot.harness.harness import AWAKE_TICKS
 from miro_robot.image import FLASH_BYTES, SPACE_BYTES, Image
 from miro_robot.mcs51.opcodes import SFRS
+from miro_sim.scenario.board_scenario import BoardText, is_board, load_any
 from miro_sim.scenario.file import changed
 from mirotwin.firmware.bare_options import BAUD, CRYSTAL
 from mirotwin.firmware.code_place import address_of
+from mirotwin.fuzz.board_target import BoardTarget
 from mirotwin.fuzz.campaign import AFTER_S, Campaign, Covering
 from mirotwin.fuzz.corpus import read_corpus
 from mirotwin.fuzz.engine import Engine, Explorer
@@ -40,9 +43,10 @@ from mirotwin.runs.spec import silent_scenario
 from mirotwin.shell.command import Argument, Option, Options, command_of
 from mirotwin.shell.console import show
 from mirotwin.shell.debug_files import SourceFolders, source_folders
-from mirotwin.shell.firmware_image import load_firmware
-from mirotwin.shell.options import FORCE, JOBS, NAME, OUT, PATH, QUIET, SEED, SLOT, Whole
+from mirotwin.shell.firmware_image import image_for, load_firmware
+from mirotwin.shell.options import FIRMWARE, FORCE, JOBS, NAME, OUT, PATH, QUIET, SEED, SET, SLOT, Whole
 from mirotwin.shell.options import Engine as EngineOption
+from mirotwin.shell.part_files import PART, bring_parts
 from mirotwin.shell.processes import cores
 from mirotwin.shell.program import Terminated, complain, show_line
 from mirotwin.shell.progress import ProgressBar
@@ -50,18 +54,25 @@ from mirotwin.shell.times import Time, TimeType, wall_time
 from mirotwin.shell.verdicts import VERDICTS
 from mirotwin.verify.checks.expect import expectations_in
 from mirotwin.verify.expectations import EXPECT, as_settings, in_files, table_alone
+from mirotwin.verify.steps.reading import steps_in
 
 if TYPE_CHECKING:
     from rich.progress import ProgressColumn
 
 LONGEST_S = 1e7
+BOARD_S = 60
+"""A board alone is the scenario of so many seconds."""
 _NINE_BITS = 0x80  # of SCON: SM0
 BARE = "Any 8051 firmware with a serial port"
+BOARD = "A board with parts"
+_FOR_ANY = ("protocol", "baud", "boot_ms")
+"""Options of either of these."""
+_NOT_FOR_BOARDS = ("robots", "slot", "bare", "crystal", "expect_all")
 
 
 class FuzzOptions(Options, frozen=True, kw_only=True):
     COMMAND = "fuzz"
-    image: Annotated[str | None, Argument("[IMAGE.ihx]", NAME)] = None
+    image: Annotated[str | None, Argument("[IMAGE.ihx|BOARD]", NAME)] = None
     time_s: Annotated[float, Option("--time", type=wall_time(LONGEST_S), help="How long: 30s, 5min, 2h.")] = (
         60.0
     )
@@ -132,16 +143,16 @@ class FuzzOptions(Options, frozen=True, kw_only=True):
         int | None, CRYSTAL.saying("Its crystal. Default 24000000.", heading=BARE, needs="bare")
     ] = None
     baud: Annotated[
-        int | None, BAUD.saying("Rate on RXD. Default: what the firmware sets.", heading=BARE, needs="bare")
+        int | None,
+        BAUD.saying("Rate on RXD. Default: what the firmware sets, or the board says.", heading=BARE),
     ] = None
     boot_ms: Annotated[
         int | None,
         Option(
             type=Whole(1, 60_000),
             metavar="MS",
-            help="Time to start up, unless it sleeps earlier. Default 200.",
+            help="Time to start up, unless it sleeps earlier. Default 200; on a board with parts: see above.",
             heading=BARE,
-            needs="bare",
         ),
     ] = None
     protocol: Annotated[
@@ -150,13 +161,30 @@ class FuzzOptions(Options, frozen=True, kw_only=True):
             metavar="NAME[:KEY=VALUE,..]",
             help="The format that makes frames of bodies: by its name, or FILE.py:CLASS[:KEY=VALUE,..].",
             heading=BARE,
-            needs="bare",
         ),
     ] = None
     expect_all: Annotated[
         bool,
         Option(help="--expect judges each input, not only those that are new.", heading=BARE, needs="bare"),
     ] = False
+    firmware: Annotated[
+        str | None,
+        FIRMWARE.saying("Image on the board. Default: the one that the scenario names.", heading=BOARD),
+    ] = None
+    settings: Annotated[
+        tuple[str, ...],
+        SET.saying("A key of the board's scenario, such as put.eyes.distance_cm=60.", heading=BOARD),
+    ] = ()
+    parts: Annotated[tuple[str, ...], PART.saying(PART.help, heading=BOARD)] = ()
+    steps: Annotated[
+        int | None,
+        Option(
+            type=Whole(0, 10_000),
+            metavar="N",
+            help="Steps of the scenario that bring the board up. Default: those before the first that is no wait.",
+            heading=BOARD,
+        ),
+    ] = None
 
 
 LINE_S = 10.0
@@ -175,10 +203,20 @@ def fuzz(options: FuzzOptions) -> int:
 
     With --bare it is any 8051 firmware with a serial port, on a processor to which nothing of the robot is connected.
 
+    BOARD is a NAME.board.toml, with --firmware, or the scenario of a board. Inputs are characters and values of its
+    parts. They begin after the waits with which the scenario's steps begin; without steps, once the firmware sleeps, or
+    its receiver is on and no branch was new for 300 ms; or after --boot-ms. The scenario's [expect] judges each input.
+
     Ctrl-C ends a campaign early, with all that was found.
 
     Exit code 1: something was found and confirmed, or --covering was not reached.
     """
+    if options.image is not None and options.image.endswith(".toml"):
+        return _fuzz_board(options)
+    if given := options.given("firmware", "settings", "parts", "steps"):
+        raise click.UsageError(f"{given[0]} needs a BOARD (NAME.board.toml, or the scenario of a board).")
+    if not options.bare and (given := options.given(*_FOR_ANY)):
+        raise click.UsageError(f"{given[0]} needs --bare, or a BOARD.")
     if options.bare and options.image is None:
         raise click.UsageError("--bare needs an IMAGE.ihx.")
     if options.expect_all and not options.expected:
@@ -207,7 +245,53 @@ def fuzz(options: FuzzOptions) -> int:
     return _campaign(spec, firmware, options, _expected(options))
 
 
-def _campaign(spec: TargetSpec, image: Image, options: FuzzOptions, expected: dict[str, Any]) -> int:
+def _fuzz_board(options: FuzzOptions) -> int:
+    """A campaign on a board with parts."""
+    source = str(options.image)
+    if given := options.given(*_NOT_FOR_BOARDS):
+        raise click.UsageError(f"{given[0]} is not for a board with parts, which {source} is.")
+    bring_parts(options.parts)
+    lasts = (f"duration_s={BOARD_S}",) if is_board(source) else ()
+    text = load_any(source, (*options.settings, *lasts, *as_settings(options.expected)))
+    if not isinstance(text, BoardText):
+        remedy = "give a board, or fuzz the robot by `mirotwin fuzz IMAGE.ihx`"
+        raise BadInput(source, "", "is a scenario of robots", remedy)
+    expectations_in(text)
+    steps = steps_in(text)
+    leading = len(list(takewhile(lambda step: not step.CHANGES or step.VERB == "pause_ms", steps)))
+    count = leading if options.steps is None else options.steps
+    if count > len(steps):
+        raise BadInput(source, "--steps", f"{count} of {amount(len(steps), 'step')}", "give fewer")
+    if count < len(steps):
+        complain(f"{source}: steps {count + 1} to {len(steps)} are left out: inputs take their place")
+    image = image_for(text, options.firmware)
+    hertz = text.scenario.clock
+    spec = TargetSpec(
+        board="wired",
+        image=str(image.path),
+        input=options.kind,
+        protocol=options.protocol or "",
+        expected=options.expected,
+        baud=options.baud or 0,
+        after_ticks=None if options.after is None else options.after.ticks(hertz),
+        parameters={
+            "tables": text.tables,
+            "steps": count,
+            "boot_ms": options.boot_ms or 0,
+            "parts": options.parts,
+        },
+        engine=cast(Literal["compiled", "python"], engines.active()),
+    )
+    return _campaign(spec, image, options, text.scenario.expect, hertz)
+
+
+def _campaign(
+    spec: TargetSpec,
+    image: Image,
+    options: FuzzOptions,
+    expected: dict[str, Any],
+    hertz: int = TICKS_PER_SECOND,
+) -> int:
     default = Path("runs") / f"fuzz-{image.path.stem}"
     folder = CampaignFolder(options.out or (default if options.force else unused(default)), options.force)
     check_outside(folder.path, options.corpus)
@@ -220,7 +304,15 @@ def _campaign(spec: TargetSpec, image: Image, options: FuzzOptions, expected: di
         inputs |= dict.fromkeys(taken)
         for note in notes:
             complain(note)
-    _check_at_rest(target, image, options.crystal or TICKS_PER_SECOND)
+    _check_at_rest(target, image, options.crystal or hertz)
+    if isinstance(target, BoardTarget) and spec.board == "wired":
+        complain(f"{image.path}: {target.note()}")
+        for name, reason in target.left_out.items():
+            complain(f"{name}: left out, it fails without any input: {reason}")
+        judged = {*target.left_out, *(check.name for check in target.checks)}
+        expected = {
+            name: value for name, value in expected.items() if name not in judged and value is not False
+        }
     reached = InputCoverage(image, lambda: make_target(spec))
     if covering is not None and covering.address in reached.total:
         reason = f"{covering.name} runs while the firmware starts, before any input"

@@ -14,7 +14,11 @@ from mirotwin.fuzz.spec import TargetSpec
 if TYPE_CHECKING:
     from mirotwin.fuzz.target import Target
 
-MAKERS = {"miro": "mirotwin.fuzz.target:robot_target", "bare": "mirotwin.fuzz.board_target:board_target"}
+MAKERS = {
+    "miro": "mirotwin.fuzz.target:robot_target",
+    "bare": "mirotwin.fuzz.board_target:board_target",
+    "wired": "mirotwin.fuzz.board_target:wired_target",
+}
 """Board -> "module:function"; the function takes the specification and returns its target."""
 
 

@@ -80,7 +80,8 @@ class BoardOracle:
     def rerun(self, data: bytes, expected: Expected, until_tick: int) -> Run:
         """An input from power-on to `until_tick`."""
         target = self.target
-        spec = board_spec(target.image, target.scenario, target.script(data), expected, until_tick)
+        script = [*target.machine.script, *target.script(data)]
+        spec = board_spec(target.image, target.scenario, script, expected, until_tick)
         return Run.traced(spec).play()
 
 

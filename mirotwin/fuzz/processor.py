@@ -2,13 +2,18 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
+
 from miro_exact.bad_input import BadInput
-from miro_exact.clock import NEVER_TICK
+from miro_exact.clock import CYCLE_TICKS, NEVER_TICK
+from miro_protocol.actions import ScriptItem
+from miro_robot.board_spec import BoardSpec
 from miro_robot.faults import FaultKind, FirmwareFault
-from miro_robot.harness.recording_bus import RecordingBus
+from miro_robot.harness.recording_bus import BareOracle, RecordingBus
 from miro_robot.image import Image
 from miro_robot.mcs51.cpu import ASLEEP, Cpu
-from miro_sim.scenario.board import FASTEST_BIT_TICKS
+from miro_sim.scenario.board import FASTEST_BIT_TICKS, BoardScenario
+from mirotwin.fuzz.wired import WiredMachine
 from mirotwin.shell.firmware_image import not_up
 
 BOOT_MS = 200
@@ -18,13 +23,14 @@ BAUD = "--baud"
 
 
 class Processor:
-    """Powered on."""
+    """Powered on. `scenario`: the board on its wire. The fuzzer plays it as it does a `WiredMachine`."""
 
     STATE = {"bus": RecordingBus, "cpu": Cpu}
-    NOT_STATE = ("image", "network", "slot")
+    NOT_STATE = ("image", "network", "slot", "scenario", "oracle")
 
-    def __init__(self, image: Image) -> None:
+    def __init__(self, image: Image, scenario: BoardScenario) -> None:
         self.image = image
+        self.scenario = scenario
         self.bus = RecordingBus()
         self.cpu = Cpu(self.bus)
         self.bus.cpu = self.cpu
@@ -32,11 +38,35 @@ class Processor:
         self.cpu.txd.unread = True
         self.cpu.rxd.settled_tick = NEVER_TICK
         self.network = self.slot = 0
+        self.oracle = BareOracle(self.bus, self.cpu)
 
     @property
     def board(self) -> Processor:
         """The board that checks look at: the processor itself."""
         return self
+
+    device = board
+    script: Sequence[ScriptItem] = ()
+    """What brought it up."""
+    to_pc: Sequence[tuple[int, int]] = ()
+
+    @property
+    def heard(self) -> list[tuple[int, int, int]]:
+        """What the serial port received: value, bit RB8, tick of RI."""
+        return self.bus.heard
+
+    @property
+    def said(self) -> list[tuple[int, int]]:
+        """What it sent: value, tick of TI."""
+        return self.bus.said
+
+    @property
+    def reset_tick(self) -> int:
+        """Of the last reset, -1 without one."""
+        return self.bus.reset_tick
+
+    def run(self, tick: int) -> int:
+        return self.cpu.run(-(-tick // CYCLE_TICKS))
 
     def start_up(self, crystal_hz: int, boot_ms: int) -> None:
         """Until the firmware sleeps, or so long. Raises BadInput where it does what it must not."""
@@ -61,7 +91,18 @@ class Processor:
         return FirmwareFault(FaultKind(bus.fault_kind), bus.fault_tick, bus.fault_pc, symbol)
 
 
-def bit_ticks_of(processor: Processor, crystal_hz: int, baud: int, boot_ms: int) -> int:
+def powered(image: Image, crystal_hz: int, boot_ms: int) -> Processor:
+    """A processor with its firmware up. Raises BadInput."""
+    try:
+        board = BoardSpec(crystal_hz=crystal_hz, bound_stack=False)
+    except ValueError as error:
+        raise BadInput("", "--crystal", str(error)) from None
+    processor = Processor(image, BoardScenario(board=board))
+    processor.start_up(crystal_hz, boot_ms)
+    return processor
+
+
+def bit_ticks_of(processor: Processor | WiredMachine, crystal_hz: int, baud: int, boot_ms: int) -> int:
     """Length of a bit: by `baud`, or as the receiver is set. Raises BadInput where neither says it."""
     if baud:
         ticks = (2 * crystal_hz + baud) // (2 * baud)

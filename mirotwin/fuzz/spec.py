@@ -22,16 +22,17 @@ Whole = Annotated[int, Meta(ge=0)]
 class TargetSpec(msgspec.Struct, frozen=True, forbid_unknown_fields=True, omit_defaults=True):
     """A target, as data.
 
-    `board`: "miro" is the robot's, "bare" a CPU with a UART. `image`: path of an Intel HEX file, "" is the robot's own
-    firmware. `input`: how the bytes of an input are read ("bytes", "frames" or "session"). `robots` and `slot` are the
-    MIRO's. `protocol`: name of the wire format of frames, "" for the board's own; `expected`: checks as --expect takes
-    them, which judge each execution beside the board's own; `baud`: rate of the bare CPU's UART, 0 for what its maker
-    takes; `after_ticks`: how long a run goes on after its last character, None for the harness's own. `parameters`: all
-    else that a maker takes. `engine`: "compiled" or "python", "" for the one that is installed.
+    `board`: "miro" is the robot's, "bare" a CPU with a UART, "wired" one with parts. `image`: path of an Intel HEX
+    file, "" is the robot's own firmware. `input`: how the bytes of an input are read ("bytes", "frames" or "session").
+    `robots` and `slot` are the MIRO's. `protocol`: name of the wire format of frames, "" for the board's own;
+    `expected`: checks as --expect takes them, which judge each execution beside the board's own; `baud`: rate of the
+    CPU's UART, 0 for what its maker takes; `after_ticks`: how long a run goes on after its last character, None for the
+    harness's own. `parameters`: all else that a maker takes. `engine`: "compiled" or "python", "" for the one that is
+    installed.
     `maker`: "module:function" in the place of the board's own maker.
     """
 
-    board: Literal["miro", "bare"] = "miro"
+    board: Literal["miro", "bare", "wired"] = "miro"
     image: str = ""
     input: str = "session"
     robots: Whole = 3

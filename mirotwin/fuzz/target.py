@@ -9,7 +9,7 @@ import msgspec
 
 from miro_exact.bad_input import BadInput
 from miro_exact.clock import CONTROL_PERIOD_TICKS
-from miro_protocol.actions import Action, Reset, ScriptItem
+from miro_protocol.actions import Action, Put, Reset, ScriptItem
 from miro_protocol.table import downlink
 from miro_protocol.transmission import DOWN, Transmission
 from miro_robot.board import Board
@@ -109,6 +109,7 @@ class Target(ABC):
                 send()
                 if reset:
                     items += self._reset(tick)
+                items += self._puts(place)
                 tick += pause
                 first = tick
             if bad_stop:
@@ -118,7 +119,23 @@ class Target(ABC):
         send()
         if program.ends_with_reset():
             items += self._reset(tick)
-        return items
+        return items + self._puts(program.count)
+
+    def _puts(self, place: int) -> list[ScriptItem]:
+        """What is put before a character of the program."""
+        puts = [self.program.put(number) for number in range(self.program.puts)]
+        begin_tick = self.harness.begin_tick + LEAD_TICKS + AHEAD_TICKS
+        return [
+            self.put_at(begin_tick + ticks, which, value) for at, ticks, which, value in puts if at == place
+        ]
+
+    def put_at(self, tick: int, which: int, value: int) -> Put:
+        """A put of the program as an action."""
+        raise NotImplementedError
+
+    def note(self) -> str:
+        """From when on inputs are played, for people; "" for what needs no words."""
+        return ""
 
     def _reset(self, tick: int) -> list[Action]:
         begin_tick = tick + AHEAD_TICKS
@@ -136,6 +153,8 @@ def described(item: ScriptItem) -> str:
         return f"{item.tick}: {item.data.hex(' ')}{bad}"
     if isinstance(item, Reset):
         return f"{item.tick}: reset {item.level}"
+    if isinstance(item, Put):
+        return f"{item.tick}: {item.text}"
     return str(item)
 
 

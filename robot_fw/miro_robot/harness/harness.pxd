@@ -40,10 +40,12 @@ cdef class Moment:
 cdef class Harness:
     cdef readonly object machine
     cdef readonly Board board
+    cdef readonly object device
     cdef readonly Cpu cpu
     cdef readonly LiveOracle oracle
     cdef readonly long long bit_ticks, begin_tick, now_tick, end_tick, after_ticks
     cdef readonly int sleeps
+    cdef int puts
     cdef Moment _start, _opening
     cdef int _opening_mask
 
@@ -53,6 +55,8 @@ cdef class Harness:
     cdef bint _opens(self, Board board, Program program) except -1
     cdef int _open(self, EventLog log) except -1
     cpdef int play(self, Program program) except -1
+    @cython.locals(number=int, tick='long long')
+    cdef int _put_values(self, Program program, int place) except -1
     cdef int _character(self, int value, int bad_stop, long long tick) except -1
     cdef int _reset(self, long long tick) except -1
     cdef int _set_reset(self, int level) except -1

@@ -127,7 +127,8 @@ class Harness:
 
     `bit_ticks`: of the line. The machine is where it shall begin, with nothing on RXD. `sleeps`: whether its firmware
     does when it has nothing to do. `after_ticks`: how long a run goes on after its last character at least, -1 for
-    what its firmware needs.
+    what its firmware needs. `device`: who runs a machine that is no `Cpu` alone. It has `run(tick)`, which returns
+    whether it stopped, `put(which, value, tick)`, `set_reset(level)`, and `back()`, after it was put back.
     """
 
     NOT_STATE = ("*",)
@@ -140,8 +141,11 @@ class Harness:
         bit_ticks: int,
         board: Board | None = None,
         after_ticks: int = -1,
+        device: Any = None,
     ) -> None:
         self.machine = machine
+        self.device = device
+        self.puts = 0  # of the program, that were done
         self.after_ticks = after_ticks
         self.board = board
         self.cpu = cpu
@@ -176,7 +180,10 @@ class Harness:
             self.board.faults.clear()
             self.board.left.commands.clear()
             self.board.right.commands.clear()
+        if self.device is not None:
+            self.device.back()
         self.now_tick = moment.tick
+        self.puts = 0
         self.oracle.begin(self.begin_tick)
         moment.tell()
 
@@ -190,6 +197,8 @@ class Harness:
             pause = program.pauses[place]
             if pause or flaws & _RESET:
                 if flaws & _RESET and self._reset(tick):
+                    return _STOPPED
+                if self._put_values(program, place):
                     return _STOPPED
                 tick += pause
                 if self._run(tick - _AHEAD):
@@ -205,9 +214,22 @@ class Harness:
         self.end_tick = tick
         if program.ends_with_reset() and self._reset(tick):
             return _STOPPED
+        if self._put_values(program, program.count):
+            return _STOPPED
         if self._run(tick + program.trailing_ticks):
             return _STOPPED
         return self._settle(tick + program.trailing_ticks)
+
+    def _put_values(self, program: Program, place: int) -> int:
+        """Does the puts before a character of the program. 1: the run is over."""
+        while self.puts < program.puts and program.put_places[self.puts] == place:
+            number = self.puts
+            self.puts += 1
+            tick = self.begin_tick + _LEAD + program.put_ticks[number] + _AHEAD
+            if self._run(tick):
+                return 1
+            self.device.put(program.put_choices[number], program.put_values[number], tick)
+        return 0
 
     def _begin(self, program: Program) -> int:
         """Puts the machine back. Returns which character of the program comes first."""
@@ -268,6 +290,8 @@ class Harness:
     def _set_reset(self, level: int) -> None:
         if self.board is not None:
             self.board.set_reset(level)
+        elif self.device is not None:
+            self.device.set_reset(level)
         elif level:
             self.cpu.hold()
         else:
@@ -282,6 +306,8 @@ class Harness:
         return 1 if stopped or self.oracle.code else 0
 
     def _move(self, until: int) -> int:
+        if self.device is not None:
+            return self._go_on(until)
         self.cpu.begin_run()
         stopped = self._go_on(until)
         self.cpu.end_run()
@@ -292,6 +318,8 @@ class Harness:
         self.now_tick = until
         if self.board is not None:
             return self.board.go_on(until)
+        if self.device is not None:
+            return 1 if self.device.run(until) else 0
         return self.cpu.go_on((until + 11) // 12)
 
     def _settle(self, tick: int) -> int:
@@ -317,12 +345,14 @@ class Harness:
         cpu = self.cpu
         stopped = 0
         asleep = 0
-        cpu.begin_run()
+        if self.device is None:
+            cpu.begin_run()
         while self.now_tick < until and not stopped and not asleep:
             stopped = self._go_on(self.now_tick + _LOOK)
             cpu.peripherals.sync(cpu.cycles)  # tells of all characters up to now
             self.oracle.look(self.now_tick)
             stopped = stopped or self.oracle.code
             asleep = cpu.idle or cpu.powered_down
-        cpu.end_run()
+        if self.device is None:
+            cpu.end_run()
         return asleep != 0 and not stopped

@@ -1,7 +1,7 @@
 cimport cython
 
-cdef int _MOST, _MOST_RESETS, _PAIR, SEQ_MODULUS, _XOR_OUT
-cdef long long _MOST_TICKS, _PAUSE, _SILENCE, _RESET_TICKS, _UP_TICKS
+cdef int _MOST, _MOST_RESETS, _MOST_PUTS, _PAIR, SEQ_MODULUS, _XOR_OUT
+cdef long long _MOST_TICKS, _PAUSE, _SILENCE, _RESET_TICKS, _UP_TICKS, _PUT_TICKS
 cdef int _BYTES, _FRAMES, _SESSION, _TEAM, _SERVICE, _ASK, _BAD_STOP, _RESET, _LONG
 cdef bytes _WHITE
 
@@ -13,6 +13,11 @@ cdef class Program:
     cdef unsigned char characters[2048]
     cdef unsigned char flaws[2048]
     cdef long long pauses[2048]
+    cdef readonly int choices, puts
+    cdef int put_places[256]
+    cdef long long put_ticks[256]
+    cdef int put_choices[256]
+    cdef int put_values[256]
     cdef readonly int count, frames
     cdef readonly long long length
     cdef unsigned char _frame[64]
@@ -34,6 +39,9 @@ cdef class Program:
     cdef void _forget_flaws(self) noexcept
     cdef int _one_frame(self) except -1
     cdef int _operation(self, int kind) except -1
+    @cython.locals(which=int, value=int, ticks='long long')
+    cdef int _one_put(self) except -1
+    cdef bint _has_put(self) noexcept
     cdef int _frame_operation(self, int kind) except -1
     cdef void _payload_from_input(self) noexcept
     cdef void _own_velocities(self) noexcept

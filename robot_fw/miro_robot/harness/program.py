@@ -24,6 +24,10 @@ Velocity -32768 is an encoding error, which no host sends: -32767 goes out in it
 
 A wire format of somebody else's comes in as `repair`, a function from a frame's body to its characters; its bodies are
 a count - 1 (low 5 bits, times 8 if the upper 3 are 1) and so many bytes, or what is left, for all frame operations.
+
+On a board with values and pins that somebody can put, nibbles 1 to 4 of a session put one of them, and take 20 us:
+
+    1 2 3 4  PUT            which (mod their number), value (16 bits, low byte first)
 """
 
 from __future__ import annotations
@@ -45,17 +49,21 @@ OPERATIONS = (
 """By nibble."""
 
 MOST_CHARACTERS = 2048
+MOST_PUTS = 256
 MOST_TICKS = 3 * TICKS_PER_SECOND
 RESET_TICKS = 48
 """How long the reset pin is up: two machine cycles are enough, these are four (AT89C52 data sheet 0313H)."""
 UP_TICKS = 5 * TICKS_PER_SECOND // 1000
+PUT_TICKS = 480
+"""A put comes in the middle: 240 ticks after the last character, and before the next, which is known so long before."""
 
 _MOST = MOST_CHARACTERS
 _MOST_TICKS = MOST_TICKS
 _MOST_RESETS = 16
+_MOST_PUTS = MOST_PUTS
 _PAUSE = TICKS_PER_SECOND // 10_000
 _SILENCE = 3 * TICKS_PER_SECOND // 1000
-_RESET_TICKS, _UP_TICKS = RESET_TICKS, UP_TICKS
+_RESET_TICKS, _UP_TICKS, _PUT_TICKS = RESET_TICKS, UP_TICKS, PUT_TICKS
 _BYTES, _FRAMES, _SESSION = BYTES, FRAMES, SESSION
 _TEAM, _SERVICE, _ASK = FrameType.TEAM, FrameType.SERVICE, FrameType.TEAM_ASK
 _PAIR = downlink(3).payload_size // 3  # two int16
@@ -69,7 +77,8 @@ class Program:
     """Reads inputs for robot `slot` of `robots`. After `read`: `count` characters, each with the pause before it, and
     the pause after the last one, `trailing_ticks`.
 
-    `how` is BYTES, FRAMES or SESSION. `repair`: another wire format. `character_ticks`: of the line.
+    `how` is BYTES, FRAMES or SESSION. `repair`: another wire format. `character_ticks`: of the line. `choices`: how
+    many values can be put. Of each of the `puts`: the character after it, ticks since the begin, which, what.
     """
 
     NOT_STATE = ("*",)
@@ -81,6 +90,7 @@ class Program:
         robots: int = 3,
         repair: Callable[[bytes], bytes] | None = None,
         character_ticks: int = 0,
+        choices: int = 0,
     ) -> None:
         if not BYTES <= how <= SESSION:
             raise ValueError(f"how = {how}: give BYTES, FRAMES or SESSION")
@@ -93,6 +103,11 @@ class Program:
         self.characters = bytearray(2048)
         self.flaws = bytearray(2048)  # bad stop bit; reset before it
         self.pauses = [0] * 2048
+        self.choices = choices
+        self.put_places = [0] * 256
+        self.put_ticks = [0] * 256
+        self.put_choices = [0] * 256
+        self.put_values = [0] * 256
         self._frame = bytearray(64)  # the next one of our own
         self._head = len(form.lead + form.sync)  # where HDR stands in it
         for place, value in enumerate(form.lead + form.sync):
@@ -107,6 +122,7 @@ class Program:
     def read(self, data: bytes | bytearray | memoryview) -> int:
         """Any bytes at all; what is too much is left out. Returns how many characters there are."""
         self.count = 0
+        self.puts = 0
         self.frames = 0  # how many frames were sealed
         self.length = 0  # ticks from the begin to the end of the last character, without waiting at the end
         self._data = data
@@ -145,6 +161,13 @@ class Program:
         """Value, whether its stop bit is bad, whether a reset comes before it, and the pause before it in ticks."""
         flaws = self.flaws[place]
         return self.characters[place], bool(flaws & _BAD_STOP), bool(flaws & _RESET), self.pauses[place]
+
+    def put(self, number: int) -> tuple[int, int, int, int]:
+        """Of one of the puts: the character after it, ticks since the begin, which value, what."""
+        if not 0 <= number < self.puts:
+            raise IndexError(f"put {number} of {self.puts}")
+        place, ticks = self.put_places[number], self.put_ticks[number]
+        return place, ticks, self.put_choices[number], self.put_values[number]
 
     def _has_room(self) -> bool:
         return self.count < _MOST and self.length < _MOST_TICKS
@@ -190,7 +213,9 @@ class Program:
             self._seal((hdr & 0xC0) | self._seq)
 
     def _operation(self, kind: int) -> None:
-        if kind < 9 and kind != 8:
+        if self.choices and 1 <= kind <= 4:
+            self._one_put()
+        elif kind < 9 and kind != 8:
             self._frame_operation(kind)
         elif kind == 8:
             if self._size:
@@ -209,10 +234,27 @@ class Program:
             self._cut = self._next()
         elif kind == 14:
             self._stop_at = self._next()
-        elif self._resets < _MOST_RESETS and not self._flags & _RESET:
+        elif self._resets < _MOST_RESETS and not self._flags & _RESET and not self._has_put():
             self._resets += 1
             self._pause(_UP_TICKS + _RESET_TICKS)
             self._flags |= _RESET
+
+    def _one_put(self) -> None:
+        which = self._next() % self.choices
+        value = self._next()
+        value |= self._next() << 8
+        ticks = self.length + self.trailing_ticks
+        if self.puts < _MOST_PUTS and ticks + _PUT_TICKS <= _MOST_TICKS:
+            self.put_places[self.puts] = self.count
+            self.put_ticks[self.puts] = ticks
+            self.put_choices[self.puts] = which
+            self.put_values[self.puts] = value
+            self.puts += 1
+            self._pause(_PUT_TICKS)
+
+    def _has_put(self) -> bool:
+        """Whether a value was put since the last character: a reset comes right after that one."""
+        return self.puts > 0 and self.put_places[self.puts - 1] == self.count
 
     def _frame_operation(self, kind: int) -> None:
         if self.repair is not None:

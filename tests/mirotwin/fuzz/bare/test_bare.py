@@ -39,11 +39,11 @@ class Counted(Protocol, frozen=True, tag="counted"):
 
 
 def received(target):
-    return [Character(value, tick, bool(stop)) for value, stop, tick in target.processor.bus.heard]
+    return [Character(value, tick, bool(stop)) for value, stop, tick in target.machine.heard]
 
 
 def sent(target):
-    return [Character(value, tick) for value, tick in target.processor.bus.said]
+    return [Character(value, tick) for value, tick in target.machine.said]
 
 
 def text(characters):
@@ -57,7 +57,7 @@ def test_characters_come_in_at_the_rate_of_the_receiver_and_answers_go_out():
     assert text(heard) == text(sent(target)) == b"hello"
     assert {later.tick - one.tick for one, later in pairwise(heard)} == {10 * target.scenario.bit_ticks}
     assert all(one.stop_good for one in heard)
-    assert target.processor.fault() is None
+    assert target.machine.fault() is None
     assert target.scenario.begin_tick < heard[0].tick < target.end_tick()
 
 
@@ -136,7 +136,7 @@ def test_any_input_gives_the_same_from_power_on_as_from_the_saved_moment(kind, f
     (listener,) = (one for one in run.checks.monitors if one.check.name == "listens")
     assert listener.received == received(target)
     assert listener.sent[: len(sent(target))] == sent(target)
-    fault, memory, other = target.processor.fault(), target.subject.memory, listener.subject.memory
+    fault, memory, other = target.machine.fault(), target.subject.memory, listener.subject.memory
     assert run.world.faults == ([] if fault is None else [fault])
     assert (other.iram, other.xram) == (memory.iram, memory.xram)
 

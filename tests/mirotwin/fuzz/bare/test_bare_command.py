@@ -107,7 +107,7 @@ def test_a_check_that_raises_ends_the_campaign_with_its_place(mirotwin, engines,
     ("arguments", "said"),
     [
         (("--bare",), "--bare needs an IMAGE.ihx."),
-        (("sleeps", "--protocol", "miro"), "--protocol needs --bare."),
+        (("sleeps", "--protocol", "miro"), "--protocol needs --bare, or a BOARD."),
         (("sleeps", "--crystal", "12000000"), "--crystal needs --bare."),
         (("sleeps", "--bare", "--slot", "1"), "--slot does not go with --bare."),
         (("sleeps", "--bare", "--expect-all"), "--expect-all needs --expect."),

@@ -1,0 +1,271 @@
+"""A board with parts as the fuzzer plays it: brought up once in a World, then put back for each input.
+
+    power-on ──> steps of the scenario, or what `_settled` waits for ──> up: inputs begin ──> characters, puts
+
+What a test may put, of any part, becomes 16 bits (`choice_of`), so that inputs need not know the parts.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from typing import Any
+
+import msgspec
+
+from miro_exact.bad_input import BadInput
+from miro_exact.clock import CYCLE_TICKS, NEVER_TICK
+from miro_protocol.actions import Put, PutValue, ScriptItem
+from miro_robot.empty_board import EmptyBoard
+from miro_robot.event_log import RECEIVED, SENT
+from miro_robot.faults import FirmwareFault
+from miro_robot.harness.harness import LiveOracle
+from miro_robot.harness.recording_bus import LONGEST_ANSWER_TICKS
+from miro_robot.image import Image
+from miro_robot.mcs51.uart import STOPPED_TICK
+from miro_robot.parts.keys import PartKeys
+from miro_robot.parts.values import checked_put
+from miro_robot.wired_board import WiredBoard
+from miro_sim.scenario.board import BoardScenario
+from miro_sim.world.wire import BoardAlone
+from miro_sim.world.world import World
+from mirotwin.fuzz.spec import MAP_SIZE
+from mirotwin.runs.run import Run
+from mirotwin.runs.spec import RunSpec
+from mirotwin.shell.firmware_image import is_up
+from mirotwin.verify.steps.keys import Step
+
+BOOT_MS = 20_000
+"""How long firmware may take until it settles."""
+SETTLED_MS = 300
+"""So long no branch is new once it has settled."""
+SLICE_MS = 10
+
+Choice = tuple[str, Callable[[int], PutValue]]
+"""The path of a value, and what 16 bits put there."""
+
+
+class WiredMachine:
+    """A board with its firmware up, as `Processor` is for a bare one. `script`: what brought it up; `choices`: what an
+    input may put; `to_pc`: characters that the board has sent since the last `back`, with the tick of their stop bit.
+
+    `steps`: they bring it up, up to the last of them; without any, it is up when it sleeps, or when its receiver is on
+    and no branch was new for 300 ms. Raises BadInput for firmware that fails meanwhile, or takes more than `boot_ms`.
+    """
+
+    NOT_STATE = ("*",)
+
+    def __init__(
+        self, scenario: BoardScenario, image: Image, steps: Sequence[Step] = (), boot_ms: int = 0
+    ) -> None:
+        self.scenario = msgspec.structs.replace(scenario, stop_on_fault=True, step=())
+        run = Run.traced(RunSpec(scenario=self.scenario, image=image, steps=steps))
+        self.world = run.world
+        device = self.world.devices[0]
+        assert isinstance(device, BoardAlone)
+        self.device = device
+        self.board: EmptyBoard = device.board
+        self.cpu = device.board.cpu
+        self.image = image
+        if steps:
+            self.how = _played(run)
+        else:
+            self.how = self._settled(boot_ms)
+        if self.board.faults:
+            reason = f"comes up with a fault: {self.board.faults[0]}"
+            raise BadInput(image.path, "", reason, "mend it, or see `mirotwin run`")
+        assert run.trace is not None
+        self.script: Sequence[ScriptItem] = run.trace.script()
+        self.begin_tick = self.cpu.cycles * CYCLE_TICKS
+        self.choices = choices_of(device.parts)
+        self.to_pc: list[tuple[int, int]] = []
+        self.reset_tick = -1
+        self.oracle = WiredOracle(self)
+        self.cpu.rxd.settled_tick = NEVER_TICK
+        self.board.input_tick = 0  # a character may always wake it
+        self.board.sent = self._sent
+        self.back()
+
+    def _settled(self, boot_ms: int) -> str:
+        """Runs until the firmware sleeps or settles, or so long; how it is known."""
+        cpu, world, clock = self.cpu, self.world, self.world.clock
+        edges, seen, new_tick = bytearray(MAP_SIZE), 0, 0
+        cpu.watch_edges(memoryview(edges))
+        while not world.stopped and world.tick < clock * (boot_ms or BOOT_MS) // 1000:
+            world.run_to(world.tick + clock * SLICE_MS // 1000)
+            if cpu.idle and not boot_ms:
+                return "the firmware sleeps"
+            if edges.count(0) != seen:
+                seen, new_tick = edges.count(0), world.tick
+            elif is_up(cpu) and not boot_ms and world.tick - new_tick >= clock * SETTLED_MS // 1000:
+                return f"its receiver is on, and no branch was new for {SETTLED_MS} ms"
+        return f"after {boot_ms or BOOT_MS} ms"
+
+    def _sent(self, value: int, tick: int, bits: int, bit_ticks: int) -> None:
+        self.to_pc.append((value, tick))
+
+    # For the harness
+
+    def run(self, tick: int) -> int:
+        return self.device.run(tick)
+
+    def set_reset(self, level: int) -> None:
+        self.board.set_reset(level)
+
+    def put(self, which: int, value: int, tick: int) -> None:
+        path, value_of = self.choices[which]
+        self.device.put(path, value_of(value), tick)
+
+    def back(self) -> None:
+        """It was put back to where it began."""
+        board = self.board
+        board.faults.clear()
+        board.log.cut(0)
+        self.to_pc.clear()
+        self.reset_tick = -1
+        if isinstance(board, WiredBoard):
+            board.starved.clear()
+        if self.device.changes is not None:
+            self.device.changes.restart(self.begin_tick)
+
+    # For the target
+
+    def put_at(self, tick: int, which: int, value: int) -> Put:
+        """The same as an action of a stream."""
+        path, value_of = self.choices[which]
+        return Put(tick, 0, 0, path, value_of(value))
+
+    def fault(self) -> FirmwareFault | None:
+        """The first one of the last run."""
+        return self.board.faults[0] if self.board.faults else None
+
+    @property
+    def heard(self) -> list[tuple[int, int, int]]:
+        """What the serial port received: value, bit RB8, tick of RI."""
+        return [(value, code, tick) for tick, code, value in self._noted(RECEIVED)]
+
+    @property
+    def said(self) -> list[tuple[int, int]]:
+        """What it sent: value, tick of TI."""
+        return [(value, tick) for tick, _, value in self._noted(SENT)]
+
+    def _noted(self, wanted: int) -> list[tuple[int, int, int]]:
+        log = self.board.log
+        events = [log.event(serial) for serial in range(log.first, log.end)]
+        return [(tick, code, value) for tick, kind, code, value, _ in events if kind == wanted]
+
+
+def _played(run: Run) -> str:
+    """Plays the steps that bring the board up. Raises BadInput for one that fails."""
+    player = run.player
+    assert player is not None
+    player.play()
+    _let_arrive(run.world)
+    if player.failure is not None:
+        remedy = "mend it, or bring the board up by fewer --steps"
+        raise BadInput(run.spec.image.path, "", f"does not come up: {player.failure}", remedy)
+    return f"after {run.spec.steps[-1]}"
+
+
+def _let_arrive(world: World) -> None:
+    """On to where all that the steps have sent and done has come."""
+    line = world.lines[0]
+    while not world.stopped and (
+        line.outbox.waiting or line.actions.waiting or line.free_tick() > world.tick
+    ):
+        world.run_to(max(world.tick, line.free_tick()) + 1)
+
+
+class WiredOracle(LiveOracle):
+    """Finds firmware faults, and lets a run go on while the serial port sends."""
+
+    NOT_STATE = ("*",)
+
+    def __init__(self, machine: WiredMachine) -> None:
+        LiveOracle.__init__(self)
+        self.machine = machine
+        self.slept_tick = -1
+
+    def begin(self, tick: int) -> None:
+        LiveOracle.begin(self, tick)
+        self.slept_tick = -1
+
+    def restarted(self, tick: int) -> None:
+        self.machine.reset_tick = tick
+
+    def look(self, tick: int) -> None:
+        if self.machine.board.faults and self.code == 0:
+            self.code, self.tick = 1, self.machine.board.faults[0].tick
+
+    def waits(self) -> bool:
+        cpu = self.machine.cpu
+        now = cpu.cycles * CYCLE_TICKS
+        if self.slept_tick < 0:
+            self.slept_tick = now
+        if cpu.powered_down or now - self.slept_tick > LONGEST_ANSWER_TICKS:
+            return False
+        return bool(cpu.peripherals.uart.ti_tick() < STOPPED_TICK)
+
+
+# What is put
+
+
+def choices_of(parts: dict[str, PartKeys]) -> list[Choice]:
+    """All that a test may put, in the order of parts and keys; what has no numbers, words or bytes is left out."""
+    choices = []
+    for name, keys in parts.items():
+        for key, kind in keys.PUTS.items():
+            path = f"{name}.{key}"
+            value_of = choice_of(msgspec.inspect.type_info(kind))
+            if value_of is not None and _takes(parts, path, value_of):
+                choices.append((path, value_of))
+    return choices
+
+
+def _takes(parts: dict[str, PartKeys], path: str, value_of: Callable[[int], PutValue]) -> bool:
+    try:
+        for value in (0, 0x7FFF, 0xFFFF):
+            checked_put(parts, path, value_of(value))
+    except ValueError:
+        return False
+    return True
+
+
+def choice_of(info: Any) -> Callable[[int], PutValue] | None:
+    """From 16 bits to a value of this type; None for a type without a rule.
+
+    A word or a boolean is chosen by the remainder, so that each bit of the low byte changes it. A number runs from its
+    lowest to its highest value; one without a limit goes through decades by the high byte. Texts are bytes in hex.
+    """
+    kind = msgspec.inspect
+    if isinstance(info, kind.BoolType):
+        return lambda bits: bool(bits & 1)
+    if isinstance(info, kind.LiteralType):
+        words: Sequence[PutValue] = [word for word in info.values if word is not None]
+        return lambda bits: words[bits % len(words)]
+    if isinstance(info, kind.UnionType):
+        rules = [rule for rule in map(choice_of, info.types) if rule is not None]
+        return (lambda bits: rules[bits % len(rules)](bits // len(rules))) if rules else None
+    if isinstance(info, kind.IntType | kind.FloatType):
+        return _number(info)
+    if isinstance(info, kind.StrType):
+        return lambda bits: bits.to_bytes(2, "little").hex()
+    return None
+
+
+def _number(info: Any) -> Callable[[int], PutValue]:
+    whole = isinstance(info, msgspec.inspect.IntType)
+    step = 1 if whole else 1e-9
+    low = info.ge if info.ge is not None else None if info.gt is None else info.gt + step
+    high = info.le if info.le is not None else None if info.lt is None else info.lt - step
+    if low is not None and high is not None:
+        span = high - low
+        if whole:
+            return lambda bits: int(low) + (bits * (int(span) + 1) >> 16)
+        return lambda bits: float(min(high, max(low, float(f"{low + span * bits / 0xFFFF:.6g}"))))
+    base, sign = (low, 1) if low is not None else (high, -1) if high is not None else (0, 1)
+
+    def far(bits: int) -> PutValue:
+        value = base + sign * (bits & 0xFF) * float(f"1e{(bits >> 8) % 8 - 4}")
+        return int(value) if whole else float(value)
+
+    return far

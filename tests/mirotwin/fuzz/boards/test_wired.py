@@ -1,0 +1,113 @@
+"""The fuzzer's target that is a board with parts: what it does is what a World does, to the tick."""
+
+from pathlib import Path
+
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from miro_exact.bad_input import BadInput
+from miro_sim.scenario.board_scenario import load_any
+from mirotwin.fuzz.board_target import BoardTarget
+from mirotwin.fuzz.oracle import BoardOracle
+from mirotwin.fuzz.wired import WiredMachine
+from mirotwin.shell.firmware_image import image_for
+from mirotwin.verify.steps.reading import steps_in
+
+BOARDS = Path(__file__).parents[4] / "examples" / "boards"
+
+
+def target_of(name, steps=1, image=None, **more):
+    text = load_any(str(BOARDS / name))
+    image = image or image_for(text)
+    machine = WiredMachine(text.scenario, image, steps_in(text)[:steps])
+    return BoardTarget(image, machine=machine, **more)
+
+
+@pytest.fixture(scope="module")
+def car():
+    return target_of("car/stops.scenario.toml")
+
+
+def cpu_of(board):
+    cpu = board.cpu
+    return cpu.cycles, cpu.pc, bytes(cpu.peek_iram(place) for place in range(256))
+
+
+SESSION = st.lists(
+    st.one_of(
+        st.sampled_from([b"\x09\x00g", b"\x09\x00e", b"\x09\x00?", b"\x0a\x40", b"\x0b\x05", b"\x0f"]),
+        st.tuples(st.just(b"\x01"), st.binary(min_size=3, max_size=3)).map(b"".join),
+        st.binary(max_size=4),
+    ),
+    max_size=10,
+).map(b"".join)
+
+
+@settings(max_examples=25, deadline=None)
+@given(data=SESSION)
+def test_an_input_does_on_the_target_what_it_does_in_a_world_from_power_on(car, data):
+    car.run(data)
+    end_tick = car.end_tick()
+    values = car.machine.device.values()
+    here = cpu_of(car.machine.board)
+    said = car.machine.said
+    run = BoardOracle(car, {}).rerun(data, {}, end_tick)
+    there = run.world.devices[0]
+    assert cpu_of(there.board) == here
+    assert there.values() == values
+    begun = car.harness.begin_tick
+    events = [there.board.log.event(serial) for serial in range(there.board.log.end)]
+    assert [(value, tick) for tick, kind, _, value, _ in events if kind == 1 and tick > begun] == said
+
+
+def test_inputs_begin_where_the_waits_of_a_scenario_end(car):
+    assert car.harness.begin_tick == car.machine.begin_tick
+    assert car.machine.how.endswith("wait_for text")
+    assert 1.5 < car.harness.begin_tick / 11_059.2 < 2.5  # ms: it has sent >
+
+
+def test_without_steps_they_begin_when_the_firmware_has_settled():
+    rover = target_of("rover/turns.scenario.toml", 0)
+    began_ms = rover.harness.begin_tick / 11_059.2
+    assert 500 < began_ms < 1000  # the display is written, the first ping is over
+    assert rover.machine.how == "its receiver is on, and no branch was new for 300 ms"
+    assert rover.machine.device.value("lcd.row2").startswith("ahead")
+
+
+def test_what_can_be_put_follows_from_the_types_of_the_parts(car):
+    choices = dict(car.machine.choices)
+    assert list(choices) == [
+        *("eyes.distance_cm", "eyes.echo", "left.load_nm", "left.blocked", "right.load_nm", "right.blocked"),
+    ]  # fmt: skip
+    distance = choices["eyes.distance_cm"]
+    assert (distance(0), distance(0xFFFF)) == (2.0, 400.0)
+    assert [choices["eyes.echo"](bits) for bits in range(4)] == ["high", "low", "none", "normal"]
+    assert [choices["left.blocked"](bits) for bits in range(3)] == [False, True, False]
+    assert choices["left.load_nm"](0) == 0.0
+    for value_of in choices.values():
+        assert len({value_of(bits) for bits in range(0, 0x10000, 17)}) > 1
+
+
+def test_a_run_leaves_nothing_to_the_next(car):
+    def outcome(data):
+        car.run(data)
+        return cpu_of(car.machine.board), car.machine.said, car.machine.device.values()
+
+    begins = b"\x09\x00?\x0b\x10"
+    first = outcome(begins)
+    outcome(b"\x09\x00g\x01\x00\x00\x00\x01\x03\x01\x00\x0b\x40\x0f")
+    assert outcome(begins) == first
+
+
+def test_firmware_that_fails_in_a_step_is_refused_in_one_line():
+    with pytest.raises(BadInput, match=r"does not come up: step 1 .*; mend it, or .* by fewer --steps"):
+        target_of(
+            "car/stops.scenario.toml", 6, image_for(load_any(str(BOARDS / "rover/turns.scenario.toml")))
+        )
+
+
+def test_steps_that_send_bring_the_board_up_too():
+    target = target_of("car/stops.scenario.toml", 2)
+    assert [item.data for item in target.machine.script] == [b"g"]
+    assert target.harness.begin_tick >= target.machine.script[0].tick + 10 * target.harness.bit_ticks

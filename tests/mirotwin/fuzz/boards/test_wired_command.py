@@ -1,0 +1,52 @@
+"""`mirotwin fuzz` of a board with parts on the command line."""
+
+import pytest
+
+from tests.mirotwin.board_files import ECHO, board_folder
+
+HANGS = ECHO.replace("MOV SBUF,A\nJNB TI,$", "CJNE A,#21h,good\nLJMP 4000h\ngood:\nMOV SBUF,A\nJNB TI,$")
+"""The same, but ! jumps to where no program is."""
+
+
+def campaign(mirotwin, folder, source, *options):
+    common = ("--time", "0.4s", "--minimise", "1s", "--out", str(folder / "out"))
+    return mirotwin("fuzz", str(source), *common, *options)
+
+
+def test_a_board_and_its_image_are_fuzzed_and_the_case_of_a_fault_gives_it_again(mirotwin, engines, tmp_path):
+    board_folder(tmp_path, program=HANGS)
+    (tmp_path / "corpus").mkdir()
+    (tmp_path / "corpus" / "first").write_bytes(b"\x09\x02a!b")
+    image = str(tmp_path / "lamp.hex")
+    board = tmp_path / "lamp.board.toml"
+    corpus = ("--corpus", str(tmp_path / "corpus"))
+    code, _, err = campaign(mirotwin, tmp_path, board, "--firmware", image, *corpus)
+    assert code == 1, err
+    assert "inputs begin at tick" in err
+    assert "they put key.pressed" in err
+    case = next((tmp_path / "out" / "crashes").glob("no_fault-*.stream"))
+    assert case.read_text().splitlines()[-1].endswith(" > 21")
+    code, _, err = mirotwin("replay", str(case), "--firmware", image)
+    assert (code, err.startswith("mirotwin: fails as recorded: no_fault")) == (3, True)
+    assert mirotwin("test", str(case), "--firmware", image)[0] == 3
+    assert mirotwin("replay", str(case), "--firmware", str(tmp_path / "inverted.hex"))[0] == 0
+
+
+@pytest.mark.parametrize(
+    ("arguments", "said"),
+    [
+        (("lamp.board.toml",), "no firmware is named; give --firmware IMAGE.hex"),
+        (("lamp.scenario.toml", "--bare"), "--bare is not for a board with parts, which"),
+        (("lamp.scenario.toml", "--slot", "1"), "--slot is not for a board with parts, which"),
+        (("lamp.scenario.toml", "--steps", "4"), "--steps: 4 of 0 steps; give fewer"),
+        (("lamp.scenario.toml", "--expect", "nothing"), "there is no such check"),
+        (("lamp.scenario.toml", "--set", "put.key.pressd=true"), "did you mean pressed?"),
+        (("lamp.hex", "--steps", "4"), "--steps needs a BOARD"),
+        (("none.board.toml",), "no such file"),
+    ],
+)
+def test_what_cannot_be_fuzzed_is_refused_in_one_line(mirotwin, engines, tmp_path, arguments, said):
+    path = board_folder(tmp_path).parent / arguments[0]
+    out = tmp_path / "out"
+    assert said in mirotwin.ends(2, "fuzz", str(path), *arguments[1:], "--time", "1s", "--out", str(out))
+    assert not out.exists()
