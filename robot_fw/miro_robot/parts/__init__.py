@@ -4,6 +4,7 @@ ELECTRONICS = {
     "at24c": "miro_robot.parts.at24c:At24c",
     "button": "miro_robot.parts.button:Button",
     "buzzer": "miro_robot.parts.buzzer:Buzzer",
+    "ds18b20": "miro_robot.parts.ds18b20:Ds18b20",
     "hc595": "miro_robot.parts.hc595:Hc595",
     "hc_sr04": "miro_robot.parts.hc_sr04:HcSr04",
     "l293d": "miro_robot.parts.l298:L293d",

@@ -168,3 +168,46 @@ class I2cBus(Wires):
         values = self.receive(count)
         self.stop()
         return values
+
+
+class OneWireBus(Wires):
+    """A thermometer at `dq`, or several by their names, and a master that makes slots of 70 us."""
+
+    def __init__(self, *keys, **named):
+        Bench.__init__(
+            self,
+            {f"chip{number or ''}": (one, {"dq": "dq"}) for number, one in enumerate(keys)},
+            ["dq"],
+            **{"crystal_hz": HZ, **named},
+        )
+        self.later(100 * US)
+
+    def low(self, us, then_us):
+        self.set(dq=0)
+        self.later(int(us * US))
+        self.set(dq=None)
+        self.later(int(then_us * US))
+
+    def reset(self, us=480):
+        """Whether somebody answers."""
+        self.low(us, 70)
+        present = not self.level("dq")
+        self.later(410 * US)
+        return present
+
+    def put_bit(self, level):
+        self.low(6 if level else 60, 64 if level else 10)
+
+    def get_bit(self):
+        self.low(2, 10)
+        level = self.level("dq")
+        self.later(58 * US)
+        return level
+
+    def send(self, *values):
+        for value in values:
+            for bit in range(8):
+                self.put_bit(value >> bit & 1)
+
+    def receive(self, count):
+        return [sum(self.get_bit() << bit for bit in range(8)) for _ in range(count)]

@@ -1,0 +1,70 @@
+"""Programs in C that ask sensors and move displays by port pins, whose times are counted in instructions."""
+
+from pathlib import Path
+
+import pytest
+
+from miro_robot.build import board_of
+from miro_robot.image import load_hex
+from miro_sim.scenario.board_file import load_board
+from tests.robot.inspect.programs import build
+
+FOLDER = Path(__file__).parent / "firmware"
+CRYSTALS = pytest.mark.parametrize("hz", [11_059_200, 12_000_000])
+
+
+class Bench:
+    """A board around a program; `lines` are what it has sent since the last look."""
+
+    def __init__(self, folder, program, parts, hz=11_059_200):
+        image = load_hex(build(folder, (FOLDER / program).read_text("utf-8")))
+        file = folder / "a.board.toml"
+        file.write_text(f'chip = "at89c52"\ncrystal_hz = {hz}\n{parts}')
+        self.board = board_of(load_board(str(file)), image)
+        self.hz, self.tick, self.sent = hz, 0, bytearray()
+        self.board.sent = lambda value, *_: self.sent.append(value)
+
+    def run(self, ms):
+        self.tick += ms * self.hz // 1000
+        self.board.run(self.tick)
+        assert self.board.faults == []
+
+    def put(self, path, value):
+        self.board.put(*path.split("."), value, self.tick)
+
+    def value(self, path):
+        return self.board.value(*path.split("."))
+
+    def lines(self):
+        lines = self.sent.decode().split("\n")[:-1]
+        del self.sent[:]
+        return lines
+
+
+@CRYSTALS
+def test_a_program_reads_a_thermometer(tmp_path, hz):
+    bench = Bench(tmp_path, "ds18b20.c", '[parts.probe]\npart = "ds18b20"\npins = { dq = "P3.7" }\n', hz)
+    bench.put("probe.temperature_c", 21.5)
+    bench.run(800)
+    assert bench.lines() == ["21.5"]
+    bench.put("probe.temperature_c", -10.125)
+    bench.run(1700)
+    assert bench.lines() == ["21.5", "-10.1"]
+    bench.put("probe.broken", "crc")
+    bench.run(800)
+    assert bench.lines() == ["crc"]
+    bench.put("probe.broken", "missing")
+    bench.run(900)
+    assert set(bench.lines()[1:]) == {"missing"}
+    bench.put("probe.broken", "none")
+    bench.run(900)
+    assert bench.lines()[-1] == "-10.1"
+
+
+@pytest.mark.parametrize("slot_us", [15, 60])
+def test_it_does_so_from_the_fastest_chip_and_from_the_slowest(tmp_path, slot_us):
+    part = f'[parts.probe]\npart = "ds18b20"\npins = {{ dq = "P3.7" }}\nslot_us = {slot_us}\n'
+    bench = Bench(tmp_path, "ds18b20.c", part)
+    bench.put("probe.temperature_c", 99.9)
+    bench.run(800)
+    assert bench.lines() == ["99.9"]
