@@ -100,6 +100,11 @@ def open_window(options: WindowOptions) -> InspectedRun:
     if first is None or last is None or first.in_ticks == last.in_ticks:
         options.ticks(clock.TICKS_PER_SECOND)
     run = open_run(options)
+    on_board = options.bare.board is not None or is_board(options.subject)
+    if on_board and last is None and run.end_tick is None and options.bare.until is None:
+        raise BadInput(
+            options.subject, "--to", "how long to look is missing", "give --to TIME, such as --to 2s"
+        )
     from_tick, to_tick = options.ticks(run.tick_hz)
     begin_tick = run.cpu.cycles * clock.CYCLE_TICKS
     if to_tick is not None and to_tick <= begin_tick:

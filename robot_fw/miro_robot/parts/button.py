@@ -39,6 +39,10 @@ class Button(PartKeys, frozen=True, kw_only=True, tag="button"):
     def pin_kind(self, number: int) -> int:
         return STRONG if self.to == "vcc" else OPEN_DRAIN
 
+    @property
+    def never_low(self) -> tuple[str, ...]:
+        return (self.PINS[0].name,) if self.to == "vcc" else ()
+
     def make(self, place: Place) -> Part:
         return ButtonPart(self, place)
 

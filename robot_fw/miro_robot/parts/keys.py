@@ -69,6 +69,11 @@ class PartKeys(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_only=
         """Pins that the part itself brings to VCC, as by a resistor: nobody else need drive them high."""
         return ()
 
+    @property
+    def never_low(self) -> tuple[str, ...]:
+        """Outputs that drive high or let go: who else reads the net sees a change only if something pulls it low."""
+        return ()
+
     def make(self, place: Place) -> Part:
         """The part of these keys, soldered to this place."""
         raise NotImplementedError

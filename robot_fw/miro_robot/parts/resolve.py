@@ -16,7 +16,7 @@ import msgspec
 
 from miro_exact.bad_input import BadInput, amount, did_you_mean
 from miro_robot.board_spec import BoardSpec, PartSpec
-from miro_robot.parts.keys import OPEN_DRAIN, STRONG, TWO_WAY
+from miro_robot.parts.keys import IN, OPEN_DRAIN, STRONG, TWO_WAY
 from miro_robot.parts.netlist import MOST_NETS, MOST_PARTS, PORT_PINS, Netlist, PartPin
 
 MOST_LATCHES = MOST_BUFFERS = 8
@@ -305,6 +305,7 @@ class _Resolver:
                 remedy = did_you_mean(name, self.choices(name), "wire another pin to it, or leave it out")
                 raise BoardError("", wire.place, f"net {name} has one pin only", remedy)
             self.check_high(name, wire)
+            self.check_low(name, wire)
 
     def choices(self, name: str) -> list[str]:
         return [other for other in (*self.wires, *self.spec.parts, *self.spec.latches) if other != name]
@@ -343,6 +344,18 @@ class _Resolver:
             why = ": P0 is open drain" if wire.ports else ": it is open drain" if OPEN_DRAIN in kinds else ""
             what = f"nothing can drive {name} high{why}"
             raise BoardError("", place, what, f'add pull_ups = ["{name}"], or "{name}" to it')
+
+    def check_low(self, name: str, wire: _Wire) -> None:
+        """That a contact to VCC does something at the processor, which reads a net that nothing drives as high."""
+        if wire.strap or wire.pulled_down or wire.latches or not (wire.ports or wire.buffers):
+            return
+        outputs = [one for one in wire.pins if self.kind(*one[:2]) != IN]
+        idle = [one for one in outputs if self.spec.parts[one[0]].keys.never_low]
+        if idle and len(idle) == len(outputs):
+            what = f"the processor reads {name} as high, closed or open"
+            raise BoardError(
+                "", self.place_of(*idle[0][:2]), what, f'add pull_downs = ["{name}"], or "{name}" to it'
+            )
 
     # The list
 

@@ -63,6 +63,7 @@ def test_the_scenario_of_a_board_is_a_subject_with_what_it_puts(mirotwin, board)
         (("fw", "run", "lamp.hex", "--board", "lmp.board.toml"), "lmp.board.toml: no such file"),
         (("fw", "trace", "lamp.board.toml"), "no program for it is named; give --firmware IMAGE.hex"),
         (("fw", "run", "lamp.hex", "--part", "no.py:Lamp"), "no.py"),
+        (("fw", "profile", "lamp.hex", "--board", "lamp.board.toml"), "how long to look is missing; give --to TIME"),
     ],
 )  # fmt: skip
 def test_what_a_board_cannot_have_is_one_line_and_exit_code_2(mirotwin, board, arguments, said):

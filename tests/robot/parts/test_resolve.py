@@ -4,6 +4,7 @@ import pytest
 
 from miro_robot.board_spec import BoardSpec, BufferSpec, LatchSpec, PartSpec, StrapSpec
 from miro_robot.build import board_of
+from miro_robot.parts.button import Button
 from miro_robot.parts.keys import IN, OPEN_DRAIN, STRONG, TWO_WAY, PartKeys, Pin
 from miro_robot.parts.led import Led
 from miro_robot.parts.netlist import PartPin
@@ -116,6 +117,11 @@ def test_pins_that_are_not_connected_are_on_no_net():
             {},
             "P0 is open drain",
         ),
+        (
+            {"a": PartSpec(keys=Button(to="vcc"), pins={"pin": "P0.0"})},
+            {},
+            'parts.a.pins.pin: the processor reads P0.0 as high, closed or open; add pull_downs = ["P0.0"]',
+        ),
         ({"a": gadget(input="P1.0", out="0")}, {}, 'an output cannot be tied to "0"'),
         (
             {"a": gadget(input="P1.0", sda="!P1.1")},
@@ -143,6 +149,19 @@ def test_what_cannot_be_built_is_one_line_with_place_and_remedy(parts, keys, mes
         resolve(BoardSpec(parts=parts, **keys))
     assert message in f"{raised.value}"
     assert "\n" not in f"{raised.value}"
+
+
+@pytest.mark.parametrize(
+    ("parts", "keys"),
+    [
+        ({}, {"pull_downs": ("P1",)}),
+        ({"b": gadget(input="P1.0", out="P1.0")}, {}),
+        ({"a": gadget(input="P1.0")}, {}),
+    ],
+)
+def test_a_contact_to_vcc_can_be_read_where_something_brings_its_net_low(parts, keys):
+    key = PartSpec(keys=Button(to="vcc"), pins={"pin": "a.data" if "a" in parts else "P1.0"})
+    assert resolve(BoardSpec(parts={"key": key, **parts}, **keys))
 
 
 def test_the_order_of_tables_changes_nothing():
