@@ -2,7 +2,7 @@ cimport cython
 from miro_robot.parts.part cimport Part
 
 cdef long long _NEVER
-cdef int _TRIG, _ECHO, _IDLE, _SENDING, _LISTENING, _NORMAL, _NONE, _LOW, _HIGH, HIGH, LOW
+cdef int _TRIG, _ECHO, _BODY, _HORN, _IDLE, _SENDING, _LISTENING, _NORMAL, _NONE, _LOW, _HIGH, HIGH, LOW
 cdef double _TRIG_US, _BURST_US, _NO_ECHO_US, _US_PER_CM, _NEAREST_CM, _FARTHEST_CM
 
 cdef class HcSr04Part(Part):
@@ -12,6 +12,16 @@ cdef class HcSr04Part(Part):
     cdef public long long rise_tick, pings
     cdef public double distance_cm
 
+    cdef double _obstacle_cm(self, long long tick) except? -1
     @cython.locals(cm=double)
-    cdef double _echo_us(self) except? -1
+    cdef double _echo_us(self, double cm) except? -1
     cdef _answer(self, int level)
+
+cdef class HcSr04OnCar(HcSr04Part):
+    cdef readonly double ahead_cm, left_cm, turned_deg
+    cdef object car, servo
+    cdef public int sees_walls
+
+    cdef _peer(self, int pin, str method, str word, str remedy)
+    @cython.locals(turned_deg=double, cm=double)
+    cdef double _obstacle_cm(self, long long tick) except? -1

@@ -3,16 +3,19 @@
 pwm  |~~|_________________|~~~|______    0.5 ms: 0 degrees .. 2.5 ms: 180 degrees
      |<->| pulse                         between two pulses the shaft moves on towards the angle, as fast as it can
      |<--- frame, 20 ms ->|
+
+What is on its horn (`horn = "neck.horn"`) turns with it, and looks ahead in the middle. `longer_turns`: to which side a
+longer pulse turns it, seen from above; an SG90 that stands upright goes to the left, though its sheet has it otherwise.
 """
 
 from __future__ import annotations
 
-from typing import Annotated
+from typing import Annotated, Literal
 
 from msgspec import Meta
 
 from miro_exact.state import FLAG, TICK
-from miro_robot.parts.keys import IN, PartKeys, Pin, Place
+from miro_robot.parts.keys import IN, STRONG, PartKeys, Pin, Place
 from miro_robot.parts.part import Part
 
 _SHORTEST_US, _LONGEST_US = 300.0, 3000.0  # what else comes is no pulse for a servo: chosen
@@ -27,7 +30,7 @@ class Servo(PartKeys, frozen=True, kw_only=True, tag="servo"):
     such pulses and as long as 50 ms. It begins in the middle.
     """
 
-    PINS = (Pin("pwm", IN),)
+    PINS = (Pin("pwm", IN), Pin("horn", STRONG, optional=True))
     READS = {
         "angle_deg": "where it is",
         "target_deg": "where it goes to, by the last pulse that counted",
@@ -42,6 +45,7 @@ class Servo(PartKeys, frozen=True, kw_only=True, tag="servo"):
     max_us: Annotated[float, Meta(ge=_SHORTEST_US, le=_LONGEST_US)] = 2500.0
     range_deg: Annotated[float, Meta(gt=0.0, le=3600.0)] = 180.0
     deg_per_s: Annotated[float, Meta(gt=0.0, le=1e6)] = 500.0
+    longer_turns: Literal["left", "right"] = "left"
 
     def __post_init__(self) -> None:
         if self.min_us >= self.max_us:
@@ -72,6 +76,7 @@ class ServoPart(Part):
         "deg_per_us",
         "range_deg",
         "deg_per_tick",
+        "way",
     )
 
     def __init__(self, keys: Servo, place: Place) -> None:
@@ -82,6 +87,7 @@ class ServoPart(Part):
         self.deg_per_us = keys.range_deg / (keys.max_us - keys.min_us)
         self.range_deg = keys.range_deg
         self.deg_per_tick = keys.deg_per_s / self.crystal_hz
+        self.way = 1.0 if keys.longer_turns == "left" else -1.0
         self.is_high = self.has_risen = 0
         self.rise_tick = self.pulse_ticks = self.frame_ticks = self.from_tick = 0
         self.angle_deg = self.target_deg = 0.5 * keys.range_deg
@@ -103,6 +109,10 @@ class ServoPart(Part):
             self.pulse_ticks = tick - self.rise_tick
             if self.shortest_ticks <= self.pulse_ticks <= self.longest_ticks:
                 self._aim(tick)
+
+    def turned_deg(self, tick: int) -> float:
+        """How far its horn is from the middle, counter-clockwise, seen from above."""
+        return self.way * (self._angle(tick) - 0.5 * self.range_deg)
 
     def _aim(self, tick: int) -> None:
         self.angle_deg = self._angle(tick)

@@ -18,6 +18,7 @@ cdef class DcMotorPart(Part):
 
     @cython.locals(a=int, b=int)
     cpdef changed(self, unsigned int pins, long long tick)
+    cpdef carry(self, double kg_m2, double friction_nm)
     cpdef double turns_per_tick(self) noexcept
     cpdef double turns_at(self, long long tick) noexcept
     cdef void _move(self, long long tick) noexcept

@@ -127,6 +127,12 @@ class DcMotorPart(Part):
         """It looks at its terminals again: while the board has no supply, nobody tells it."""
         self.changed(0, tick)
 
+    def carry(self, kg_m2: float, friction_nm: float) -> None:
+        """What the shaft turns besides: the share of a car, from now on."""
+        keys: Any = self.keys
+        self.kg_m2 = keys.inertia_kg_m2 + kg_m2
+        self.friction_nm = keys.friction_nm + friction_nm
+
     def put(self, name: str, value: Any, tick: int) -> None:
         self._move(tick)
         setattr(self, name, value)
