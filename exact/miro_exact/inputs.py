@@ -3,7 +3,9 @@
 Every file that a stranger may have made is read through here. `replace_file` writes one, whole or not at all.
 """
 
+import codecs
 import os
+import re
 import stat
 from contextlib import suppress
 from pathlib import Path
@@ -97,6 +99,25 @@ def read_input(
     if len(data) > limit:
         raise _too_long(path, limit)
     return data
+
+
+_MARKS = ((codecs.BOM_UTF8, "utf-8"), (codecs.BOM_UTF16_LE, "utf-16-le"), (codecs.BOM_UTF16_BE, "utf-16-be"))
+_NON_ASCII = re.compile(rb"[\x80-\xff]+")
+
+
+def decode(data: bytes) -> str:
+    """A text file of whatever program: UTF-16 or UTF-8 by its mark, else UTF-8, CP936 (Chinese Windows), or CP1252.
+
+    What is not UTF-8 is CP936 if its bytes above 7Fh come in pairs: letters of CP1252 mostly stand alone.
+    """
+    for mark, encoding in _MARKS:
+        if data.startswith(mark):
+            return data[len(mark) :].decode(encoding, "replace")
+    with suppress(UnicodeDecodeError):
+        return data.decode("utf-8")
+    lengths = [len(found) for found in _NON_ASCII.findall(data)]
+    single = sum(length & 1 for length in lengths)
+    return data.decode("gb18030" if 2 * single < len(lengths) else "cp1252", "replace")
 
 
 def check_ends(path: str | os.PathLike[str]) -> None:

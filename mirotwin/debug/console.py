@@ -18,6 +18,7 @@ import msgspec
 from miro_exact.bad_input import BadInput
 from miro_exact.clock import CYCLE_TICKS, TICKS_PER_SECOND
 from miro_protocol.toml_text import TomlError, struct_of
+from miro_robot.image.symbol_files import read_text
 from miro_robot.inspect.frames import StackFrame
 from miro_robot.mcs51.opcodes import disassemble
 from miro_sim.world.conditions import CONDITIONS
@@ -251,7 +252,7 @@ class Console(Cmd):
         if line is not None and path is not None:
             wanted = rest.rpartition(":")[2]
             middle = int(wanted) if ":" in rest and wanted.isdecimal() else line.line
-            rows = enumerate(path.read_text(errors="replace").splitlines(), 1)
+            rows = enumerate(read_text(path).splitlines(), 1)
             shown = [
                 (number, f"{number:4}  {text}")
                 for number, text in rows

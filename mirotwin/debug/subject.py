@@ -86,7 +86,7 @@ def open_subject(options: DebugSubject, everyone: bool = False) -> tuple[Debugge
     timeline = Timeline(run)
     debugger, notes, why = Debugger(timeline, symbols, everyone), list[str](), "begin"
     if not image.symbols.names:
-        notes.append(f"no symbols: no .map or .cdb beside {image.path.name}; places are addresses")
+        notes.append(f"no symbols: no .map, .cdb or .M51 beside {image.path.name}; places are addresses")
     elif files and not any(map(symbols.sources.path, files)):
         notes.append("no C files: --sources names their folder")
     with timeline.shown(f"opening {subject}"):

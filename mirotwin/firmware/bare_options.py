@@ -11,7 +11,7 @@ from typing import Annotated
 import msgspec
 
 from miro_exact.bad_input import BadInput, amount
-from miro_exact.inputs import TEXT_BYTES, read_input
+from miro_exact.inputs import TEXT_BYTES, decode, read_input
 from miro_robot.board_spec import CRYSTAL_HZ, BoardSpec
 from miro_robot.empty_board import EmptyBoard
 from miro_robot.faults import FirmwareFault
@@ -399,4 +399,4 @@ def _stdin_bytes(path: str) -> bytes:
 def _pins(options: BareOptions) -> tuple[PinEvent, ...]:
     if options.pins is None:
         return ()
-    return read_pins(read_input(options.pins).decode("utf-8-sig", errors="replace"), options.pins)
+    return read_pins(decode(read_input(options.pins)), options.pins)

@@ -10,6 +10,7 @@ from miro_exact.bad_input import BadInput
 from miro_robot.firmware import source_folder
 from miro_robot.image import Image
 from miro_robot.image.debug_info import Sources
+from miro_robot.image.keil_map import project_folders
 from mirotwin.shell.command import Option
 from mirotwin.shell.firmware_image import load_firmware
 from mirotwin.shell.options import IMAGE, NAME
@@ -48,11 +49,12 @@ def is_robots_own(image: Image) -> bool:
 
 
 def source_folders(image: Image, given: Sequence[str] = ()) -> Sources:
-    """Where C files are looked for: the folders of --sources, the image's own, and for the robot's firmware that one's.
+    """Where C files are looked for: the folders of --sources, the image's own (and the project's above `Objects`), and
+    for the robot's firmware that one's.
 
     Raises BadInput for a folder that is not there.
     """
-    folders, own = [*map(Path, checked_sources(given)), image.path.parent], source_folder()
+    folders, own = [*map(Path, checked_sources(given)), *project_folders(image.path)], source_folder()
     if own is not None and is_robots_own(image):
         folders.append(own)
     return Sources(folders)

@@ -10,6 +10,7 @@ import pytest
 
 from miro_exact.bad_input import BadInput
 from miro_protocol import stream
+from miro_robot.image.keil_map import parse_keil_map
 from miro_robot.image.symbol_files import parse_cdb, parse_listing, parse_map
 from mirotwin import campaign
 from mirotwin.camera import picture
@@ -136,6 +137,8 @@ def test_a_named_pipe_is_not_waited_for_where_any_bytes_are_read(words, tmp_path
         (parse_map, "CABS" + " " * LONG + "x = 0. bytes (ABS,CON,CODE)"),
         (parse_map, "CABS " + "A" * LONG + " 00000000 = 0. bytes"),
         (parse_map, "C: " + " " * LONG + "00000000  _x"),
+        (parse_keil_map, "BL51 LINKER/LOCATER\n" + " " * LONG + "C:0000H" + " " * LONG + "x"),
+        (parse_keil_map, "  CODE 0000H 0000H" + " x" * LONG + " (" * LONG + ")"),
         (parse_cdb, "S:G$" + "a" * LONG + "$0_0$0(" + ")," * LONG + "C"),
         (parse_cdb, "L:C$" + "$" * LONG + ":00"),
         (parse_listing, " " * LONG + "1 ;\tmain.c:22"),

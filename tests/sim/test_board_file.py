@@ -231,7 +231,7 @@ def test_a_mistake_is_one_line_with_place_and_remedy(text, message):
 
 
 def test_what_is_no_file_and_no_board_is_one_line(tmp_path):
-    (tmp_path / "a.toml").write_bytes(b"\xff\xfe")
+    (tmp_path / "a.toml").write_bytes(b"\x81")
     (tmp_path / "b.toml").write_text("chip = ")
     for source, message in [
         ("miroo", "miroo: no such board; "),

@@ -12,6 +12,7 @@ from pathlib import Path
 import msgspec
 
 from miro_robot.image.hex import Image, ImageError
+from miro_robot.image.keil_map import keil_map, keil_map_path
 from miro_robot.image.symbol_files import (
     CdbFile,
     SourceLine,
@@ -69,7 +70,13 @@ class DebugInfo:
         lines += [(address, line) for address, line in cdb.lines if _name(line.file) not in known]
         paths = {_name(line.file): line.file for _, line in lines}
         symbols = [symbol.address for symbol in image.symbols.names.values() if symbol.space == "code"]
-        functions = _cdb_functions(cdb, image.code, paths)
+        functions = [*_cdb_functions(cdb, image.code, paths)]
+        keil = None if lines or functions else keil_map(image.path)
+        if keil is not None:
+            lines = [*keil.lines]
+            first = dict(reversed(lines))
+            functions = [Function(name, at, end, first.get(at)) for name, at, end in keil.functions]
+            tables += [*keil.extents("?CO?"), *keil.extents("?C_INITSEG")]
         return cls(lines, functions, [*map_constants(link_map), *tables], symbols)
 
     def line_at(self, address: int) -> SourceLine | None:
@@ -143,6 +150,8 @@ def _inside(folder: Path, file: str) -> Path | None:
     """The regular file of that name in the folder; None where there is none, or it lies elsewhere."""
     try:
         path = (folder / file).resolve()
+        if not path.exists() and "/" not in file:  # Windows' linkers write names in another case
+            path = next((one.resolve() for one in folder.iterdir() if one.name.lower() == file.lower()), path)
         there = path.is_relative_to(folder.resolve()) and path.is_file()
     except (OSError, ValueError, RuntimeError):  # a name that is too long, or has a NUL; a circle of links
         return None
@@ -174,7 +183,9 @@ def debug_files(image: Path, stem: str) -> dict[str, Path]:
     modules = set(map(_name, map_modules(link_map)))
     for path in listings(image, link_map):
         found[path.name if path.stem in modules else f"{stem}.rst"] = path
-    return {name: path for name, path in found.items() if path.is_file()}
+    found = {name: path for name, path in found.items() if path.is_file()}
+    keil = None if found else keil_map_path(image)
+    return found if keil is None else {f"{stem}.m51": keil}
 
 
 def _read_listing(path: Path, image: Image) -> Iterator[tuple[int, int, SourceLine | None]]:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import hashlib
 import re
-from codecs import BOM_UTF8
+from codecs import BOM_UTF8, BOM_UTF16_BE, BOM_UTF16_LE
 from collections.abc import Iterator
 from functools import lru_cache, partial
 from pathlib import Path
@@ -12,8 +12,9 @@ from pathlib import Path
 import msgspec
 
 from miro_exact.bad_input import BadInput, did_you_mean
-from miro_exact.inputs import IMAGE_BYTES, read_input
+from miro_exact.inputs import IMAGE_BYTES, decode, read_input
 from miro_robot.image.evidence import Contradiction, check_cdb, check_map
+from miro_robot.image.keil_map import keil_map, keil_map_path
 from miro_robot.image.symbol_files import Symbol, Symbols, parse_cdb, parse_map, read_text
 
 FLASH_BYTES = 8192  # of an AT89C52
@@ -120,11 +121,12 @@ def parse_hex(
 @lru_cache(32)  # by content: a test loads the robot's image hundreds of times
 def _parsed(content: bytes, limit: int) -> tuple[Image, bytes]:
     """What a file's content alone says; and 1 for each address that it has a byte for."""
-    if not content.removeprefix(BOM_UTF8).strip(_BLANK):
+    records = _as_bytes(content)
+    if not records.strip(_BLANK):
         raise ImageError("", 0, "is empty", _REBUILD)
     code = bytearray(b"\xff" * SPACE_BYTES)
     loaded = bytearray(SPACE_BYTES)
-    for line, address, data in _data_records(content):
+    for line, address, data in _data_records(records):
         end = address + len(data)
         if end > limit:
             first = max(address, limit)
@@ -141,6 +143,13 @@ def _parsed(content: bytes, limit: int) -> tuple[Image, bytes]:
     return image, bytes(loaded)
 
 
+def _as_bytes(content: bytes) -> bytes:
+    """The records without a byte-order mark, a byte a character where an editor saved them as UTF-16."""
+    if content.startswith((BOM_UTF16_LE, BOM_UTF16_BE)):
+        return decode(content).encode("latin-1", "replace")
+    return content.removeprefix(BOM_UTF8)
+
+
 def _names_beside(path: Path, content: bytes, limit: int) -> dict[str, Symbol]:
     """The names in the `.map` and `.cdb` beside an image; what is missing contributes nothing.
 
@@ -151,7 +160,14 @@ def _names_beside(path: Path, content: bytes, limit: int) -> dict[str, Symbol]:
     found_map, found_cdb = parse_map(read_text(map_path)), parse_cdb(read_text(cdb_path))
     _refuse(map_path, check_map(found_map, known.code, loaded))
     _refuse(cdb_path, check_cdb(found_cdb, known.code, loaded))
-    return found_map.names | found_cdb.names
+    keil = None if found_map.names or found_cdb.names else keil_map(path)
+    if keil is None:
+        return found_map.names | found_cdb.names
+    keil_path = keil_map_path(path) or map_path
+    reason = keil.misses_start_up(known.code)
+    _refuse(keil_path, Contradiction(0, reason) if reason else None)
+    _refuse(keil_path, check_map(keil.map_file, known.code, loaded))
+    return keil.map_file.names
 
 
 def _refuse(beside: Path, found: Contradiction | None) -> None:
@@ -179,7 +195,7 @@ def _data_records(content: bytes) -> Iterator[tuple[int, int, bytes]]:
     """
     base = 0
     begun = ended = False
-    for number, raw in enumerate(content.removeprefix(BOM_UTF8).splitlines(), start=1):
+    for number, raw in enumerate(content.splitlines(), start=1):
         text = raw.strip(_BLANK)
         if ended:
             _refuse_data(text, number)

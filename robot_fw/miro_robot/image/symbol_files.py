@@ -16,7 +16,7 @@ from pathlib import Path
 import msgspec
 
 from miro_exact.bad_input import BadInput
-from miro_exact.inputs import read_input
+from miro_exact.inputs import decode, read_input
 
 _KEPT = 32
 _SPACE = 0x10000  # an address beyond is damage: no memory of the 8051 has it
@@ -80,7 +80,7 @@ class ListedCode(msgspec.Struct, frozen=True):
 
 def read_text(path: Path) -> str:
     """The text of a file beside an image, "" if there is none. Raises InputError for one that is too long."""
-    return read_input(path).decode("utf-8-sig", errors="replace") if path.is_file() else ""
+    return decode(read_input(path)) if path.is_file() else ""
 
 
 _HEX = re.compile(r"[0-9A-F]{8}")

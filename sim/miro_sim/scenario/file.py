@@ -13,6 +13,7 @@ import msgspec
 
 from miro_exact.bad_input import did_you_mean, one_line
 from miro_exact.inputs import InputError, read_input
+from miro_exact.inputs import decode as any_text
 from miro_protocol.toml_text import TEXT_KIB, check_numbers, tables, without_none
 from miro_sim.scenario.base import is_path, with_base
 from miro_sim.scenario.errors import ScenarioError, value_error
@@ -23,6 +24,7 @@ from miro_sim.scenario.settings import Setting, blamed, drop_other_kind, make
 from miro_sim.scenario.variants import with_variant
 
 _BUILTIN = Path(__file__).parent / "builtin"
+_DAMAGED = "\ufffd"  # what stands for bytes that no encoding has
 LONGEST_S = 86_400.0
 """The longest duration that a scenario may have: a day."""
 
@@ -115,12 +117,12 @@ def _no_such_file(path: str) -> ScenarioError:
 
 
 def decode(raw: bytes, origin: str) -> str:
-    """The text of a scenario file. Raises ScenarioError with the line that is not UTF-8."""
-    try:
-        return raw.decode("utf-8")
-    except UnicodeDecodeError as error:
-        line = raw.count(b"\n", 0, error.start) + 1
-        raise ScenarioError(origin, f"line {line}", "not UTF-8 text", "save the file as UTF-8") from None
+    """The text of a scenario file. Raises ScenarioError with the line that is no text in any of its encodings."""
+    text = any_text(raw)
+    if _DAMAGED in text:
+        line = text.count("\n", 0, text.index(_DAMAGED)) + 1
+        raise ScenarioError(origin, f"line {line}", "not UTF-8 text", "save the file as UTF-8")
+    return text
 
 
 def parse(text: str, origin: str, settings: Sequence[str] = ()) -> Scenario:

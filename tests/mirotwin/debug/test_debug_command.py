@@ -93,7 +93,7 @@ def test_a_saved_world_is_gone_on_from(mirotwin, console, tmp_path):
 
 def test_an_image_without_symbols_has_addresses_and_says_so(console, bare):
     out = console(bare, lines=["break 0x0044", "c", "where", "rfinish", "step", "next", "rnext", "list"])
-    assert out.splitlines()[0] == "no symbols: no .map or .cdb beside bare.ihx; places are addresses"
+    assert out.splitlines()[0] == "no symbols: no .map, .cdb or .M51 beside bare.ihx; places are addresses"
     assert " #0  0x0044 in " in out.replace("*", " ")
     assert " #1  0x003b in " in out
 

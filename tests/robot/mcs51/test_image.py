@@ -39,6 +39,13 @@ def written(tmp_path, *lines):
     return path
 
 
+@pytest.mark.parametrize("encoding", ["utf-16", "utf-8-sig"])
+def test_an_image_that_an_editor_saved_in_another_encoding_is_read(tmp_path, encoding):
+    path = tmp_path / "robot.hex"
+    path.write_bytes(f"{record(0, [2, 0, 16])}\r\n{END}\r\n".encode(encoding))
+    assert load_hex(path).used == ((0, 3),)
+
+
 def test_bytes_ranges_size_and_hash_of_an_image(tmp_path):
     path = written(tmp_path, record(0, b"\x02\x00\x10"), record(0x10, b"\x80\xfe"), END)
     image = load_hex(path)
