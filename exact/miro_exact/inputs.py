@@ -116,8 +116,8 @@ def decode(data: bytes) -> str:
     with suppress(UnicodeDecodeError):
         return data.decode("utf-8")
     lengths = [len(found) for found in _NON_ASCII.findall(data)]
-    single = sum(length & 1 for length in lengths)
-    return data.decode("gb18030" if 2 * single < len(lengths) else "cp1252", "replace")
+    odd = [length for length in lengths if length & 1]
+    return data.decode("gb18030" if 2 * len(odd) < len(lengths) else "cp1252", "replace")
 
 
 def check_ends(path: str | os.PathLike[str]) -> None:
