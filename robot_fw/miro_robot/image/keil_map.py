@@ -117,7 +117,10 @@ def keil_map(image: Path) -> KeilMap | None:
 class _Reader:
     """What has been read so far; `depth`: PROC, DO and BLOCK that are open, within which names are locals."""
 
-    NOT_STATE = ("module", "function", "depth")  # a reader belongs to no world
+    NOT_STATE = (  # a reader belongs to no world
+        *("files", "segments", "codes", "publics", "statics", "lines", "begun"),
+        *("module", "function", "depth"),
+    )
 
     def __init__(self) -> None:
         self.files: dict[str, str] = {}  # of modules, without their endings
