@@ -13,6 +13,7 @@ ELECTRONICS = {
     "lcd2004": "miro_robot.parts.lcd1602:Lcd2004",
     "led": "miro_robot.parts.led:Led",
     "lm629": "miro_robot.parts.lm629:Lm629Keys",
+    "pcf8591": "miro_robot.parts.pcf8591:Pcf8591",
     "relay": "miro_robot.parts.relay:Relay",
     "servo": "miro_robot.parts.servo:Servo",
 }

@@ -68,3 +68,17 @@ def test_it_does_so_from_the_fastest_chip_and_from_the_slowest(tmp_path, slot_us
     bench.put("probe.temperature_c", 99.9)
     bench.run(800)
     assert bench.lines() == ["99.9"]
+
+
+@CRYSTALS
+def test_a_program_reads_voltages_and_puts_one_out(tmp_path, hz):
+    part = '[parts.adc]\npart = "pcf8591"\npins = { scl = "P2.0", sda = "P2.1" }\n'
+    bench = Bench(tmp_path, "pcf8591.c", part, hz)
+    for number, volts in enumerate((1.25, 0.0, 5.0, 3.3)):
+        bench.put(f"adc.ain{number}_v", volts)
+    bench.run(60)
+    assert bench.lines()[-1] == "1.25 0.00 4.98 3.28 "
+    bench.put("adc.ain0_v", 2.5)
+    bench.run(100)
+    assert bench.lines()[-1] == "2.50 0.00 4.98 3.28 "
+    assert (bench.value("adc.aout_v"), bench.value("adc.short_clocks")) == (2.5, 0)
