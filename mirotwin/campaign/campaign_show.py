@@ -12,7 +12,15 @@ from rich.table import Table
 
 from miro_exact.bad_input import BadInput, amount
 from mirotwin.campaign.columns import CHECK
-from mirotwin.campaign.comparison import FEWEST_FOR_GATE, GATED, SHOWN, MetricDifference, differences
+from mirotwin.campaign.comparison import (
+    FEWEST_FOR_GATE,
+    GATED,
+    SHOWN,
+    MetricDifference,
+    differences,
+    judged,
+    shown,
+)
 from mirotwin.campaign.rows import SHARES, UNSETTLED, Arm, ResultRows, paired, paired_levels
 from mirotwin.campaign.statistics import Figures, Interval
 from mirotwin.shell.command import Argument, Option, Options, command_of
@@ -36,7 +44,8 @@ class ShowOptions(Options, frozen=True, kw_only=True):
             "--metric",
             metavar="NAME",
             help="A figure of the results, or failed, fault, error, unsettled, check.NAME; may be repeated."
-            f" Default: {', '.join(SHOWN)}; in comparisons {', '.join(GATED)}.",
+            f" Default: {', '.join(SHOWN)}; in comparisons {', '.join(GATED)}. Of boards: how long each wait took, and"
+            " values of parts; in comparisons the waits, failed, error, fault.",
         ),
     ] = ()
     by: Annotated[
@@ -79,10 +88,10 @@ def show(options: ShowOptions) -> int:
     if not rows.count:
         raise BadInput(results, "", "holds no runs", "give the results of a campaign")
     if options.between is not None:
-        return _compare(rows, options.between, metrics or GATED, as_json)
+        return _compare(rows, options.between, metrics or judged(rows), as_json)
     if against is not None:
-        return _against(rows, against, metrics or GATED, options.tolerance / 100.0, as_json)
-    _show(rows, metrics or SHOWN, options.by or rows.about.factors, as_json)
+        return _against(rows, against, metrics or judged(rows), options.tolerance / 100.0, as_json)
+    _show(rows, metrics or shown(rows), options.by or rows.about.factors, as_json)
     return DONE
 
 

@@ -4,6 +4,7 @@
     one column a factor and a drawn key, `draw` (where something is drawn), `seed`
     verdict, error, failure, digest
     the figures of `summary.json`; those of the first robot, as there
+    of a board `step_N_ms` too, how long each wait took, and the values that the campaign names, by PART.KEY
     check.NAME                             verdict of that check
 
 To add a column, add a line to `COLUMNS`. It is made from a `Summary` and `Tracks`; what neither has yet is counted in
@@ -16,11 +17,13 @@ Wall times are in a file of their own (`results`), because all the rest is the s
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator, Mapping
+import re
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from functools import cached_property, reduce
-from typing import Any, get_args, get_type_hints
+from typing import Any, TypeAlias, get_args, get_type_hints
 
 from miro_exact.clock import TICKS_PER_SECOND
+from mirotwin.campaign.design import as_kind
 from mirotwin.recording.theory.figures import (
     Assumption1,
     Assumption2,
@@ -29,6 +32,7 @@ from mirotwin.recording.theory.figures import (
     Theory,
 )
 from mirotwin.recording.track import Tracks
+from mirotwin.runs.board_summary import BoardSummary, SerialFigures
 from mirotwin.runs.summary import FirmwareCounts, LinkCounts, Summary, Tracking, VisionCounts, tracking_of
 
 TEXTS = ("verdict", "error", "failure", "digest")
@@ -37,7 +41,8 @@ OWN = ("run", "draw", "seed", *TEXTS)
 CHECK = "check."
 SEEN = ("seen_x_cm", "seen_y_cm", "seen_theta_deg", "seen_position_cm")
 """Root mean squares of the camera's measurements against the reference at their exposure."""
-_PARTS: tuple[tuple[str, tuple[str, ...], type], ...] = (
+_Part: TypeAlias = tuple[str, tuple[str, ...], type]
+_PARTS: tuple[_Part, ...] = (
     ("", ("tracking",), Tracking),
     ("", ("theory",), Theory),
     ("", ("theory", "disturbance"), DisturbanceFigures),
@@ -49,6 +54,8 @@ _PARTS: tuple[tuple[str, tuple[str, ...], type], ...] = (
     ("", ("firmware",), FirmwareCounts),
 )
 """Prefix of the columns, where the figures stand in a summary, and their struct."""
+_BOARD_PARTS: tuple[_Part, ...] = (("", ("serial",), SerialFigures), ("", ("firmware",), FirmwareCounts))
+"""The same of the summary of a board."""
 
 
 def _kinds(struct: type) -> Iterator[tuple[str, type]]:
@@ -62,8 +69,8 @@ def _kinds(struct: type) -> Iterator[tuple[str, type]]:
 class _Run:
     """The source of the columns of one run."""
 
-    def __init__(self, summary: Summary, tracks: Tracks) -> None:
-        self.summary = summary
+    def __init__(self, summary: Summary | BoardSummary, tracks: Tracks) -> None:
+        self.summary: Any = summary
         self.first = next(iter(tracks.robots.values()), None)
 
     @cached_property
@@ -79,28 +86,51 @@ class _Run:
         return max((one.rms_position_cm for one in everyone if one.rms_position_cm is not None), default=None)
 
 
+_Column: TypeAlias = tuple[type, Callable[[_Run], Any]]
+
+
 def _at(*way: str) -> Callable[[_Run], Any]:
     """Reads a field through structs: None where a struct on the way is None."""
     return lambda run: reduce(lambda value, part: value and getattr(value, part), way, run)
 
 
-COLUMNS: Mapping[str, tuple[type, Callable[[_Run], Any]]] = {
-    "simulated_s": (float, lambda run: run.summary.simulated_s),
+def _of_parts(parts: Sequence[_Part]) -> dict[str, _Column]:
+    return {
+        prefix + name: (kind, _at("summary", *way, name))
+        for prefix, way, struct in parts
+        for name, kind in _kinds(struct)
+    }
+
+
+_SIMULATED: dict[str, _Column] = {"simulated_s": (float, lambda run: run.summary.simulated_s)}
+COLUMNS: Mapping[str, _Column] = {
+    **_SIMULATED,
     "settled": (bool, lambda run: None if run.first is None else run.first.errors[-1].settled),
     "worst_rms_position_cm": (float, _Run.worst_rms_position_cm),
     **{name: (float, _at("seen", name.replace("seen_", "rms_"))) for name in SEEN},
-    **{
-        prefix + name: (kind, _at("summary", *way, name))
-        for prefix, way, struct in _PARTS
-        for name, kind in _kinds(struct)
-    },
+    **_of_parts(_PARTS),
 }
 """Name -> int, float or bool, and the value in one run: None where it has none. `settled`: the first robot is within
 3 cm and 0.15 rad at the end. `worst_rms_position_cm`: the largest `rms_position_cm` of all robots."""
 FIGURES: Mapping[str, type] = {name: kind for name, (kind, _) in COLUMNS.items()}
+BOARD_COLUMNS: Mapping[str, _Column] = {**_SIMULATED, **_of_parts(_BOARD_PARTS)}
+"""The same of a run of a board."""
+BOARD_FIGURES: Mapping[str, type] = {name: kind for name, (kind, _) in BOARD_COLUMNS.items()}
 
 
-def figures_of(summary: Summary, tracks: Tracks) -> dict[str, Any]:
-    """The figures of one run."""
-    run = _Run(summary, tracks)
-    return {name: value(run) for name, (_, value) in COLUMNS.items()}
+def figures_of(
+    summary: Summary | BoardSummary, tracks: Tracks, values: Mapping[str, type] = {}
+) -> dict[str, Any]:
+    """The figures of one run, with those of the `values` of parts that it has. Raises ValueError for another kind."""
+    run, columns = _Run(summary, tracks), COLUMNS if isinstance(summary, Summary) else BOARD_COLUMNS
+    found = {name: value(run) for name, (_, value) in columns.items()}
+    parts = summary.parts if isinstance(summary, BoardSummary) else {}
+    return found | {path: as_kind(parts[path], kind) for path, kind in values.items() if path in parts}
+
+
+STEP = re.compile(r"step_[0-9]+_ms")
+
+
+def step_column(number: int) -> str:
+    """The column of how long the wait of step `number` took."""
+    return f"step_{number}_ms"

@@ -12,17 +12,32 @@ from collections.abc import Sequence
 import msgspec
 import numpy as np
 
-from mirotwin.campaign.rows import ResultRows
+from mirotwin.campaign.columns import BOARD_FIGURES, CHECK, STEP
+from mirotwin.campaign.rows import SHARES, ResultRows
 from mirotwin.campaign.statistics import Interval, Numbers, mean, mean_interval, quantile
 
 FEWEST_FOR_GATE = 20
 """Seeds below which a comparison fails or passes by the luck of a few."""
 COUNTED = ("error", "fault")
 SHOWN = ("rms_position_cm", "rms_theta_deg", "settling_s")
-"""Metrics that are shown unless others are requested."""
+"""Metrics of robots that are shown unless others are requested."""
 GATED = (*SHOWN, "unsettled", "failed", *COUNTED)
-"""Metrics that are judged unless others are requested. A smaller number is better in each."""
+"""Metrics of robots that are judged unless others are requested. A smaller number is better in each."""
 MORE_IS_BETTER = ("frames_accepted", "frames_sent", "simulated_s", "vision_frames", "idle_cycles")
+
+
+def shown(rows: ResultRows) -> tuple[str, ...]:
+    """The metrics that are shown unless others are requested: of boards the times of waits, and values of parts."""
+    if not rows.alone:
+        return SHOWN
+    own = [name for name in rows.metrics() if name not in (*BOARD_FIGURES, *SHARES) and CHECK not in name]
+    return tuple(own) or ("failed",)
+
+
+def judged(rows: ResultRows) -> tuple[str, ...]:
+    """The metrics that are judged unless others are requested: of boards the times of waits, and shares of runs."""
+    times = [name for name in rows.metrics() if STEP.fullmatch(name)]
+    return (*times, "failed", *COUNTED) if rows.alone else GATED
 
 
 class MetricDifference(msgspec.Struct, frozen=True):

@@ -24,7 +24,7 @@ BUILTIN = Path(__file__).parent / "builtin"
 MOST_RUNS = 1_000_000_000
 """More is a mistake in the file."""
 SCENARIO, FIRMWARE = "scenario", "firmware"
-NOT_VARIED = ("name", "title", "network", "step", "expect", "seed")
+NOT_VARIED = ("name", "title", "network", "board", "step", "expect", "seed")
 """Keys of a scenario that are no factor by themselves."""
 
 
@@ -43,6 +43,7 @@ class Document(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
     seeds: str | int = 0
     firmware: str = ""
     set: dict[str, Any] = {}
+    values: tuple[str, ...] = ()
     allowed_failed_share: Annotated[float, Meta(ge=0.0, le=1.0)] = 0.0
     expect: dict[str, Any] = {}
     grid: dict[str, Any] = {}
@@ -99,6 +100,7 @@ def _parsed(text: str, path: Path) -> Plan:
         firmware=firmware,
         settings=tuple(settings),
         allowed_failed_share=document.allowed_failed_share,
+        values=document.values,
         design=design,
     )
 

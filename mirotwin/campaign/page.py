@@ -9,7 +9,7 @@ from typing import Annotated, Any
 
 from miro_exact.bad_input import BadInput
 from miro_sim.scenario.settings import EXPECT
-from mirotwin.campaign.comparison import GATED, SHOWN, differences
+from mirotwin.campaign.comparison import differences, judged, shown
 from mirotwin.campaign.design import inline
 from mirotwin.campaign.results import ResultsInfo
 from mirotwin.campaign.rows import SHARES, Arm, ResultRows, label_of, paired_levels
@@ -56,7 +56,7 @@ def campaign_page(path: Path) -> bytes:
     rows = ResultRows(path)
     if not rows.count:
         raise BadInput(path, "", "holds no runs", "give the results of a campaign")
-    metrics = [name for name in SHOWN if name in rows.metrics()]
+    metrics = [name for name in shown(rows) if name in rows.metrics()]
     by = _by(rows)
     made: dict[str, Any] = {}
     arms = _arms(rows, by, metrics, made)
@@ -110,12 +110,12 @@ def _comparisons(rows: ResultRows, made: dict[str, Any]) -> list[dict[str, Any]]
             pairs = paired_levels(rows, factor, first, second)
             if not pairs or len(comparisons) == MOST_COMPARISONS:
                 continue
-            compared = differences(GATED, rows, rows, pairs)
-            shown = [(one, numbers) for one, numbers in compared if one.metric in SHOWN]
+            compared = differences(judged(rows), rows, rows, pairs)
+            drawn = [(one, numbers) for one, numbers in compared if one.metric in shown(rows)]
             figure = ""
-            if any(one.first and one.interval for one, _ in shown):
+            if any(one.first and one.interval for one, _ in drawn):
                 figure = f"plot-pairs-{len(comparisons)}"
-                made[figure] = apart(shown)
+                made[figure] = apart(drawn)
             levels = {"factor": factor, "first": first, "second": second, "pairs": len(pairs)}
             comparisons.append({**levels, "differences": [one for one, _ in compared], "figure": figure})
     return comparisons

@@ -8,25 +8,32 @@ from __future__ import annotations
 
 import hashlib
 from collections.abc import Iterator, Mapping, Sequence
-from typing import Any
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
 
 import msgspec
+from msgspec.structs import replace
 
 from miro_exact import engine
 from miro_exact.bad_input import BadInput
-from miro_sim.scenario.errors import ScenarioError
-from miro_sim.scenario.file import builtin_names, load
+from miro_sim.scenario.board_scenario import FIRMWARE, AnyText, BoardText, is_board, load_any
+from miro_sim.scenario.file import builtin_names
 from miro_sim.scenario.plugins import plugins_used
 from miro_sim.scenario.settings import OPTION, option_words
-from mirotwin.campaign.columns import CHECK, FIGURES, OWN
+from mirotwin.campaign.columns import BOARD_FIGURES, CHECK, FIGURES, OWN, step_column
 from mirotwin.campaign.design import Design, DesignPoint, Factor, Level, Value, as_kind, kind_of
 from mirotwin.campaign.single import image_of, prepared
 from mirotwin.campaign.versions import Versions, versions
 from mirotwin.campaign.worker import ImageCopy, Work
-from mirotwin.shell.firmware_image import load_firmware
+from mirotwin.runs.spec import RunSpec
+from mirotwin.shell.firmware_image import image_for
 from mirotwin.shell.json_text import json_bytes
-from mirotwin.verify.steps.keys import CheckStep
+from mirotwin.shell.options import plain_parameters
+from mirotwin.verify.steps.keys import CheckStep, Step, WaitStep
 from mirotwin.verify.steps.player import check_symbols
+
+if TYPE_CHECKING:
+    from miro_sim.world.world import World
 
 OWN_IMAGE = "own"
 FORM = 1
@@ -53,8 +60,11 @@ class Plan(msgspec.Struct, frozen=True):
     """A campaign. What its file says: `path` names the file in errors; `settings`: what all runs set, each with the
     place that says it.
 
-    What `checked` adds: `scenarios` (whole texts), `images`: by the names and paths that the file uses; `checks`: names
-    of all checks, in the order in which they are met; `notes`: what settings left out, a line each.
+    `values`: those of a board's parts that its rows have, by PART.KEY.
+
+    What `checked` adds: `scenarios` (whole texts), `images`: by the names and paths that the file uses, that of a board
+    by its scenario; `checks`: names of all checks, in the order in which they are met; `figures`: columns of the rows
+    and their types; `notes`: what settings left out, a line each.
     """
 
     path: str
@@ -63,9 +73,11 @@ class Plan(msgspec.Struct, frozen=True):
     firmware: str = ""
     settings: tuple[tuple[str, str], ...] = ()
     allowed_failed_share: float = 0.0
+    values: tuple[str, ...] = ()
     scenarios: Mapping[str, str] = {}
     images: Mapping[str, ImageCopy] = {}
     checks: tuple[str, ...] = ()
+    figures: Mapping[str, type] = {}
     versions: Versions = msgspec.field(default_factory=versions)
     notes: tuple[str, ...] = ()
 
@@ -82,9 +94,10 @@ class Plan(msgspec.Struct, frozen=True):
             [text for _, text in sorted(self.scenarios.items())],
             [image.sha256 for _, image in sorted(self.images.items())],
             self.settings,
-            msgspec.structs.replace(design, factors=()),
+            replace(design, factors=()),
             [(one.name, [(level.value, level.settings) for level in one.levels]) for one in design.factors],
             self.checks,
+            *([self.values] if self.values else []),
         )
         return hashlib.sha256(json_bytes(content)).hexdigest()
 
@@ -101,6 +114,8 @@ class Plan(msgspec.Struct, frozen=True):
         for level in point.levels:
             scenario = level.scenario or scenario
             image = level.firmware or image
+        if image in ("", OWN_IMAGE) and scenario in self.images:
+            image = scenario
         settings = [setting for setting, _ in self.settings]
         return Work(
             run=run,
@@ -111,6 +126,7 @@ class Plan(msgspec.Struct, frozen=True):
             firmware=self.images[image],
             engine=engine.active(),
             versions=self.versions,
+            values={path: self.figures[path] for path in self.values if path in self.figures},
         )
 
     def varied(self, run: int) -> dict[str, Value]:
@@ -135,16 +151,19 @@ def plan_of_levels(name: str, levels: Sequence[Level], seeds: range, settings: S
 def checked(plan: Plan, settings: Sequence[str] = ()) -> Plan:
     """The plan with more `settings` for all runs, and with all that they need. Raises BadInput with the place."""
     made = tuple((text, " ".join(option_words(text))) for text in settings)
-    plan = msgspec.structs.replace(plan, settings=(*plan.settings, *made))
-    for name in plan.design.names:
-        if name in OWN or name in FIGURES or name.startswith(CHECK):
-            raise BadInput(plan.path, name, "is the name of a column of the results", "choose another name")
+    plan = replace(plan, settings=(*plan.settings, *made))
     for setting, place in plan.settings:
         key = setting.partition("=")[0].strip()
         if key in plan.design.names:
             reason = f"the campaign varies {key}, this would have no effect"
             raise BadInput(plan.path, place, reason, "leave it out, or the key in the campaign's file")
-    return _tried(msgspec.structs.replace(plan, scenarios=_scenarios(plan), images=_images(plan)))
+    texts = _scenarios(plan)
+    named = replace(plan, scenarios={name: text.text for name, text in texts.items()})
+    made_plan = _tried(replace(named, images=_images(plan, texts)))
+    for name in plan.design.names:
+        if name in OWN or name in made_plan.figures or name.startswith(CHECK):
+            raise BadInput(plan.path, name, "is the name of a column of the results", "choose another name")
+    return made_plan
 
 
 def _tried(plan: Plan) -> Plan:
@@ -152,20 +171,53 @@ def _tried(plan: Plan) -> Plan:
     checks: dict[str, None] = {}
     plugins: set[str] = set()
     notes: dict[str, None] = {}
+    figures: dict[str, type] = {}
     for point in _tried_points(plan.design):
         places = _places(plan, point)
         job = plan.work_at(0, point)
         try:
             text, expected, steps = prepared(job.origin, job.text, job.settings)
+            if isinstance(text, BoardText) and text.firmware:
+                remedy = "write firmware = .. at the top of the campaign's file, or in its [grid]"
+                raise BadInput(job.origin, FIRMWARE, "is no key that is set", remedy)
             check_symbols(steps, image_of(job.firmware), job.origin)
         except BadInput as error:
             raise _placed(plan, places, error) from error.__cause__
+        figures |= _figures(plan, text, steps, job)
         plugins.update(plugins_used(text.scenario))
         of_steps = [step.checks for step in steps if isinstance(step, CheckStep)]
         checks |= {check.name: None for group in (*expected.values(), *of_steps) for check in group}
         notes |= {_placed_note(plan, places, note): None for note in text.notes}
-    used = msgspec.structs.replace(plan.versions, parts=tuple(sorted(plugins)))
-    return msgspec.structs.replace(plan, checks=tuple(checks), notes=tuple(notes), versions=used)
+    used = replace(plan.versions, parts=tuple(sorted(plugins)))
+    return replace(plan, checks=tuple(checks), figures=figures, notes=tuple(notes), versions=used)
+
+
+def _figures(plan: Plan, text: AnyText, steps: Sequence[Step], job: Work) -> dict[str, type]:
+    """The columns of a run and their types. Raises BadInput for values that its board does not have."""
+    figures = dict(BOARD_FIGURES if isinstance(text, BoardText) else FIGURES)
+    if isinstance(text, BoardText):
+        figures |= {step_column(step.number): float for step in steps if isinstance(step, WaitStep)}
+    if plan.values:
+        if not isinstance(text, BoardText):
+            what = f"are of a board's parts, and {text.origin} is for robots"
+            raise BadInput(plan.path, "values", what, "leave them out")
+        with BadInput.at(plan.path, "values"), plain_parameters(text.origin):
+            figures |= _kinds_of_values(RunSpec.of(text, image_of(job.firmware)).world(), plan.values)
+    return figures
+
+
+def _kinds_of_values(world: World, paths: Sequence[str]) -> dict[str, type]:
+    """The types of columns for these values of parts, by those at power-on: all numbers share one. Raises BadInput."""
+    (board,) = world.devices
+    kinds: dict[str, type] = {}
+    for path in paths:
+        try:
+            kind = type(board.value(path))
+        except ValueError as error:
+            reason, _, remedy = f"{error}".partition("; ")
+            raise BadInput("", "", reason, remedy) from None
+        kinds[path] = kind if kind in (bool, str) else float
+    return kinds
 
 
 def _tried_points(design: Design) -> Iterator[DesignPoint]:
@@ -180,27 +232,40 @@ def _tried_points(design: Design) -> Iterator[DesignPoint]:
         yield DesignPoint(tuple(levels), tuple(drawn), 0, design.first_seed)
 
 
-def _scenarios(plan: Plan) -> dict[str, str]:
-    texts = {}
+def _scenarios(plan: Plan) -> dict[str, AnyText]:
+    """The scenarios by their names: all of robots, or all of boards."""
+    texts: dict[str, AnyText] = {}
     for name, place in _named(plan, plan.scenario, "scenario"):
+        with BadInput.at(plan.path, place):
+            if is_board(name):
+                remedy = f'write a NAME.scenario.toml with board = "{Path(name).name}" and duration_s'
+                raise BadInput("", "", f"{name} is a board, which no run ends by itself", remedy)
         try:
             own = ("expect={}",) if name in builtin_names() else ()  # a campaign varies what it presupposes
-            texts[name] = load(name, own).text
-        except ScenarioError as error:
+            text = load_any(name, own)
+            # whole, so the text need not say where its file is: the same campaign elsewhere has the same
+            texts[name] = replace(text, origin=Path(name).name) if isinstance(text, BoardText) else text
+        except BadInput as error:
             raise BadInput(plan.path, place, f"{error}") from None
+        if type(texts[name]) is not type(texts[plan.scenario]):
+            what = f"{name} and {plan.scenario} are a board's and robots', which have other columns"
+            raise BadInput(plan.path, place, what, "make a campaign of each")
     return texts
 
 
-def _images(plan: Plan) -> dict[str, ImageCopy]:
+def _images(plan: Plan, texts: Mapping[str, AnyText]) -> dict[str, ImageCopy]:
+    """The images by their names, that of a board by its scenario: which images fit depends on the chip."""
     copies = {}
     for name, place in _named(plan, plan.firmware, "firmware"):
-        path = "" if name == OWN_IMAGE else name
-        try:
-            image = load_firmware(path)
+        path = None if name in ("", OWN_IMAGE) else name
+        for scenario, text in texts.items():
+            try:
+                image = image_for(text, path)
+            except BadInput as error:
+                raise BadInput(plan.path, place, f"{error}") from None
             names = {name: (at.address, at.space) for name, at in image.symbols.names.items()}
-            copies[name] = ImageCopy(f"{image.path}", image.sha256, image.content, json_bytes(names))
-        except BadInput as error:
-            raise BadInput(plan.path, place, f"{error}") from None
+            copy = ImageCopy(f"{image.path}", image.sha256, image.content, json_bytes(names))
+            copies[scenario if path is None and isinstance(text, BoardText) else name] = copy
     return copies
 
 

@@ -37,7 +37,7 @@ def spread(metric: str, arms: Sequence[tuple[Arm, Numbers]]) -> Any:
     labels = [wrapped(arm.label) for arm, _ in arms]
     made = _rows(metric, labels)
     _dots(made, [(label, numbers) for label, (_, numbers) in zip(labels, arms, strict=True)])
-    _widen(made, LEAST[metric], *(numbers for _, numbers in arms))
+    _widen(made, LEAST.get(metric, 0.0), *(numbers for _, numbers in arms))
     quantiles = [figures.quantiles for arm, _ in arms if (figures := arm.metrics[metric]) is not None]
     shares = {share: [one[share] for one in quantiles] for share in ("0.05", "0.25", "0.5", "0.75", "0.95")}
     source = ColumnDataSource({"arm": labels, **shares})

@@ -19,7 +19,7 @@ import msgspec
 
 from miro_exact.bad_input import BadInput, shortened
 from miro_exact.inputs import check_regular
-from mirotwin.campaign.columns import CHECK, FIGURES, OWN, TEXTS
+from mirotwin.campaign.columns import BOARD_FIGURES, CHECK, FIGURES, OWN, TEXTS
 from mirotwin.campaign.design import Level, kind_of
 from mirotwin.campaign.journal import in_order, outcomes
 from mirotwin.campaign.plan import OWN_IMAGE, Head, Plan
@@ -35,7 +35,7 @@ GIVE = "give the .parquet file of a campaign"
 MOST_ROWS, MOST_COLUMNS, MOST_MIB, META_BYTES = 5_000_000, 2000, 2 << 10, 64 << 20
 EACH_ROW = {"run": ("int64",), "seed": ("int64",), "verdict": ("string",)}
 """Columns that no row may lack, with their types."""
-OWN_COLUMNS = frozenset((*OWN, *FIGURES))
+OWN_COLUMNS = frozenset((*OWN, *FIGURES, *BOARD_FIGURES))
 ROWS = 10_000
 """Rows of a group: what is in memory while a file is written."""
 META = b"mirotwin_campaign"
@@ -213,7 +213,7 @@ def _schema(plan: Plan) -> pa.Schema:
     kinds |= {factor.name: type(factor.levels[0].value) for factor in design.factors}
     kinds |= {draw.name: kind_of(draw.ends()) for draw in design.draws}
     kinds |= {"draw": int} if design.draws else {}
-    kinds |= {"seed": int, **dict.fromkeys(TEXTS, str), **FIGURES}
+    kinds |= {"seed": int, **dict.fromkeys(TEXTS, str), **plan.figures}
     kinds |= {CHECK + name: str for name in plan.checks}
     types = {float: pa.float64(), int: pa.int64(), bool: pa.bool_(), str: pa.string()}
     return pa.schema([(name, types[kind]) for name, kind in kinds.items()])
@@ -222,7 +222,7 @@ def _schema(plan: Plan) -> pa.Schema:
 def _row(plan: Plan, outcome: RunOutcome) -> dict[str, Any]:
     row: dict[str, Any] = {"run": outcome.run, **plan.varied(outcome.run)}
     row |= {name: getattr(outcome, name) for name in TEXTS}
-    row |= {name: outcome.figures.get(name) for name in FIGURES}
+    row |= {name: outcome.figures.get(name) for name in plan.figures}
     return row | {CHECK + name: outcome.checks.get(name) for name in plan.checks}
 
 

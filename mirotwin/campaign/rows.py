@@ -14,7 +14,7 @@ import msgspec
 import numpy as np
 
 from miro_exact.bad_input import BadInput
-from mirotwin.campaign.columns import CHECK, FIGURES
+from mirotwin.campaign.columns import CHECK, OWN
 from mirotwin.campaign.design import Value, inline
 from mirotwin.campaign.results import read
 from mirotwin.campaign.statistics import Figures, Numbers, Seeds, figures
@@ -70,11 +70,19 @@ class ResultRows:
         """Columns that say which run a row is, but for the seed."""
         return (*self.about.factors, *self.about.drawn)
 
+    @property
+    def alone(self) -> bool:
+        """Whether the runs are those of boards."""
+        return "to_board" in self.table.column_names
+
     def metrics(self) -> list[str]:
         """All that `numbers` knows; results of another version may have fewer."""
-        there = set(self.table.column_names)
-        figures = [name for name in FIGURES if name in there and name not in NOT_FIGURES]
-        return [*figures, *SHARES, UNSETTLED, *(CHECK + name for name in self.about.checks)]
+        others = {*OWN, *self.varied, *NOT_FIGURES, *(CHECK + name for name in self.about.checks)}
+        figures = [
+            one.name for one in self.table.schema if one.name not in others and f"{one.type}" != "string"
+        ]
+        unsettled = [] if self.alone else [UNSETTLED]
+        return [*figures, *SHARES, *unsettled, *(CHECK + name for name in self.about.checks)]
 
     def check_metric(self, name: str) -> str:
         """Raises BadInput for a name that is no metric of these rows."""

@@ -14,13 +14,15 @@ import msgspec
 from msgspec.structs import replace
 
 from miro_exact.bad_input import BadInput
-from miro_robot.image import Image, parse_hex
-from miro_sim.periods import RobotId
-from miro_sim.scenario.file import ScenarioText, of_text
-from mirotwin.campaign.columns import figures_of
+from miro_robot.image import SPACE_BYTES, Image, parse_hex
+from miro_sim.periods import Period, RobotId
+from miro_sim.scenario.board import BoardScenario
+from miro_sim.scenario.board_scenario import AnyText, any_of_text
+from mirotwin.campaign.columns import figures_of, step_column
 from mirotwin.campaign.worker import ImageCopy, RunOutcome, Work
 from mirotwin.recording.recorder import source_of
 from mirotwin.recording.track import Tracks
+from mirotwin.runs.board_summary import SerialCounts, summarise_board
 from mirotwin.runs.result import Result
 from mirotwin.runs.run import Run
 from mirotwin.runs.spec import RunSpec
@@ -29,16 +31,16 @@ from mirotwin.shell.program import traceback_text
 from mirotwin.shell.verdicts import judge
 from mirotwin.verify.checks.expect import expectations_of
 from mirotwin.verify.checks.interface import Check, Expectation
-from mirotwin.verify.steps.keys import Step
+from mirotwin.verify.steps.keys import Step, WaitStep
 from mirotwin.verify.steps.reading import steps_of
 
 
 @lru_cache(maxsize=64)
 def prepared(
     origin: str, text: str, settings: tuple[str, ...]
-) -> tuple[ScenarioText, dict[RobotId, list[Check]], list[Step]]:
+) -> tuple[AnyText, dict[RobotId, list[Check]], list[Step]]:
     """A scenario with its settings made, what it expects, and its steps. Raises BadInput for one that cannot be run."""
-    spec = of_text(text, origin, settings)
+    spec = any_of_text(text, origin, settings)
     return spec, expectations_of(spec.scenario, origin), steps_of(spec.scenario, origin)
 
 
@@ -46,7 +48,7 @@ def prepared(
 def image_of(firmware: ImageCopy) -> Image:
     """The image with its names, as where the plan was made."""
     names = msgspec.json.decode(firmware.names, type=dict[str, tuple[int, str]])
-    return parse_hex(firmware.content, Path(firmware.path), names=names)
+    return parse_hex(firmware.content, Path(firmware.path), SPACE_BYTES, names)
 
 
 def run_single(job: Work) -> RunOutcome:
@@ -67,26 +69,49 @@ def _run(job: Work) -> RunOutcome:
     image = image_of(job.firmware)
     text, expected, steps = prepared(job.origin, job.text, job.settings)
     spec = replace(RunSpec.of(text, image, job.seed), expected=expected, steps=steps)
-    run = Run(spec)
-    tracks = Tracks(delay_frames=text.scenario.camera.delay_frames)
+    run, serial, scenario = Run(spec), SerialCounts(), text.scenario
+    tracks = Tracks(
+        delay_frames=None if isinstance(scenario, BoardScenario) else scenario.camera.delay_frames
+    )
+
+    def keep(period: Period) -> None:
+        tracks.add(period)
+        serial.add(period)
+
     began_s = perf_counter()
     if job.recording:
         with Path(job.recording).open("wb") as stream:
-            run.record(stream, source_of(text, run.world), tracks)
+            run.record(stream, source_of(text, run.world), tracks, on_period=serial.add)
     else:
-        run.drive(on_period=tracks.add)
+        run.drive(on_period=keep)
     wall_s = perf_counter() - began_s
     run.finish()
     result = run.result()
+    if isinstance(scenario, BoardScenario):
+        summary = summarise_board(run.world, serial, wall_s)
+        figures = figures_of(summary, tracks, job.values) | step_times(run)
+    else:
+        figures = figures_of(summarise(run.world, tracks, wall_s), tracks)
     return RunOutcome(
         run=job.run,
         verdict=result.verdict,
         failure=_failure(run, result),
         digest=tracks.digest,
-        figures=figures_of(summarise(run.world, tracks, wall_s), tracks),
+        figures=figures,
         checks=_verdicts(result.expectations),
         wall_s=wall_s,
     )
+
+
+def step_times(run: Run) -> dict[str, float]:
+    """How long each wait took that was fulfilled, by its column."""
+    player = run.player
+    took = zip(player.steps, player.took_ticks, strict=False) if player else ()
+    return {
+        step_column(step.number): 1000.0 * ticks / run.world.clock
+        for step, ticks in took
+        if isinstance(step, WaitStep)
+    }
 
 
 def _failure(run: Run, result: Result) -> str:

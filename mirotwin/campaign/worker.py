@@ -7,6 +7,7 @@ from __future__ import annotations
 
 import os
 import socket
+from collections.abc import Mapping
 from functools import cache
 
 import msgspec
@@ -29,7 +30,8 @@ class ImageCopy(msgspec.Struct, frozen=True):
 class Work(msgspec.Struct, frozen=True):
     """One run: a whole scenario as text, `settings` to make in it, and a seed. `run`: its number in the plan.
 
-    `recording`: the file for a recording, if it is recorded.
+    `values`: the values of parts that its row has, and their types. `recording`: the file for a recording, if it is
+    recorded.
     """
 
     run: int
@@ -40,6 +42,7 @@ class Work(msgspec.Struct, frozen=True):
     firmware: ImageCopy
     engine: str
     versions: Versions
+    values: Mapping[str, type] = {}
     recording: str = ""
 
 

@@ -126,7 +126,8 @@ class Player:
 
     `steps`: the steps that the machine can do and show, up to the first that it cannot do and that changes what
     follows. `unseen`: a line for each step that it cannot do or show. `count`: number of all steps; `done`: number of
-    steps done. `saved`: states of `save` steps, by name. `checks`: checks that steps began.
+    steps done, `took_ticks`: how long each took. `saved`: states of `save` steps, by name. `checks`: checks that steps
+    began.
     """
 
     def __init__(self, machine: Machine, steps: Sequence[Step], origin: str = "") -> None:
@@ -139,6 +140,7 @@ class Player:
         self.origin = origin
         self.hosts = [Host(machine, index) for index in range(len(machine.networks))]
         self.done = 0
+        self.took_ticks: list[int] = []
         self.failure: StepFailure | None = None
         self.saved: dict[str, bytes] = {}
         self.checks: list[Checks] = []
@@ -179,6 +181,7 @@ class Player:
                 reason, _, remedy = f"{error}".removeprefix(f"{self.origin}: ").partition("; ")
                 raise ScenarioError(self.origin, f"step {step.number}", reason, remedy) from error
             self.done += 1
+            self.took_ticks.append(self.machine.tick - begun_tick)
 
     def finish(self) -> None:
         """Runs to the end; what goes on by itself goes on. Ends the checks that steps began."""

@@ -30,15 +30,18 @@ _STOP = CHARACTER_BITS - 1
 
 
 class BoardAlone(Device):
-    """A board on a wire. `parts`: the keys of those that are on it, by name. `changes`: for who watches it."""
+    """A board on a wire. `parts`: the keys of those that are on it, by name. `reads`: part and key of each value by
+    its path. `changes`: for who watches it.
+    """
 
-    NOT_STATE = ("sample_ticks", "parts", "changes")
+    NOT_STATE = ("sample_ticks", "parts", "reads", "changes")
 
     def __init__(self, board: EmptyBoard, network: int, image: Image) -> None:
         Device.__init__(self, board, network, 0, image)
         self.board: EmptyBoard
         self.sample_ticks = board.spec.crystal_hz // 1000
         self.parts = {part.name: part.keys for part in board.parts} if isinstance(board, WiredBoard) else {}
+        self.reads = {f"{name}.{key}": (name, key) for name, keys in self.parts.items() for key in keys.READS}
         self.changes = Changes(self, board) if isinstance(board, WiredBoard) else None
 
     def run(self, tick: int) -> int:
@@ -62,15 +65,11 @@ class BoardAlone(Device):
             self.changes.look(tick)
 
     def value(self, path: str) -> float | int | bool | str:
-        part, key = checked_read(self.parts, path)
+        part, key = self.reads.get(path) or checked_read(self.parts, path)
         return self._wired.value(part, key)
 
     def values(self) -> dict[str, float | int | bool | str]:
-        return {
-            f"{name}.{key}": self._wired.value(name, key)
-            for name, keys in self.parts.items()
-            for key in keys.READS
-        }
+        return {path: self._wired.value(*part_and_key) for path, part_and_key in self.reads.items()}
 
     @property
     def _wired(self) -> WiredBoard:
