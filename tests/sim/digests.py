@@ -5,7 +5,7 @@ With names of runs it prints their digests: `python -m tests.sim.digests "fig6 0
 Every built-in scenario, every kind of camera and picture noise, every profile of the radio, both variants, every
 disturbance, and two teams: at full length with seed 7, beside a short run for engines and machines that are slow.
 `board_digests.json`: every scenario file of the boards among the examples as `mirotwin test` runs it; a car with noise
-and an encoder; a robot whose board is a net list; and parts alone. First come the short ones.
+and an encoder, one that drives over a line; a robot whose board is a net list; and parts alone. First the short ones.
 
 Functions import what has to wait until the engine is chosen.
 """
@@ -32,9 +32,14 @@ NOISY = (
     "examples/boards/car/emergency.scenario.toml {} s seed 7 --set board.parts.eyes.noise_cm=0.5"
     ' --set board.parts.wheel={{part="encoder",pins={{shaft="left.shaft",a="P3.4",b="P3.5"}},lines=200}}'
 )
+ON_A_PLANE = (
+    "examples/boards/car/drives.scenario.toml {} s seed 7 --set board.parts.car.lines=[[[49,90],[49,110]]]"
+    ' --set board.parts.line={{part="line_sensors",pins={{body="car.body",s1="P1.4",s2="P1.5",s3="P1.6"}}}}'
+)
 SHORTEST_BOARDS = (
     "examples/boards/modbus/coils.scenario.toml 0.2 s seed 0",
     NOISY.format("0.2"),
+    ON_A_PLANE.format("0.25"),
     "net list: fig6 0.06 s seed 7",
     "parts: 200 steps seed 1",
 )
@@ -43,6 +48,7 @@ SHORT_BOARDS = (
     *SHORTEST_BOARDS,
     "examples/boards/car/emergency.scenario.toml 0.4 s seed 0",
     "examples/boards/rover/turns.scenario.toml 0.4 s seed 0",
+    "examples/boards/follower/turns.scenario.toml 0.5 s seed 0",
 )
 """Those that an emulated processor runs through in seconds."""
 TWO_TEAMS = "examples/two_teams.toml"

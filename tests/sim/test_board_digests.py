@@ -20,7 +20,8 @@ from tests.sim.board_runs import in_pieces, play, run_of, shuffled
 GOLDEN = digests.table_in(digests.BOARDS)
 WHOLE = [name for name in GOLDEN if name.endswith("seed 0") and name not in digests.SHORT_BOARDS]
 SESSIONS = [
-    f"examples/boards/{name}.scenario.toml" for name in ("car/emergency", "modbus/address", "rover/pause")
+    f"examples/boards/{name}.scenario.toml"
+    for name in ("car/drives", "car/emergency", "follower/turns", "modbus/address", "rover/pause")
 ]
 """A file of each board; what they do: send, put values, switch power."""
 

@@ -11,7 +11,7 @@ BOARDS = Path(__file__).parents[3] / "examples" / "boards"
 SOURCES = sorted(BOARDS.glob("*/*.c"))
 
 
-def test_the_tests_of_the_three_boards_pass(mirotwin):
+def test_the_tests_of_the_boards_pass(mirotwin):
     code, out, errors = mirotwin("test", BOARDS)
 
     assert code == 0, out + errors
