@@ -4,6 +4,8 @@ ELECTRONICS = {
     "at24c": "miro_robot.parts.at24c:At24c",
     "button": "miro_robot.parts.button:Button",
     "buzzer": "miro_robot.parts.buzzer:Buzzer",
+    "dht11": "miro_robot.parts.dht11:Dht11",
+    "dht22": "miro_robot.parts.dht11:Dht22",
     "ds18b20": "miro_robot.parts.ds18b20:Ds18b20",
     "hc595": "miro_robot.parts.hc595:Hc595",
     "hc_sr04": "miro_robot.parts.hc_sr04:HcSr04",

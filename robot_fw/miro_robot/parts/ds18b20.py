@@ -283,11 +283,13 @@ class Ds18b20Part(Part):
     # Tests
 
     def put(self, name: str, value: Any, tick: int) -> None:
-        """A temperature holds from the next conversion on. What is not there, or shorted, is not mended by a reset."""
+        """A temperature holds from the next conversion on; what is missing has no supply either."""
         if name == "temperature_c":
             self.temperature_c = value
             return
         self.broken = _BROKEN.index(value)
+        if self.broken == _MISSING:
+            self._lose()
         if self.broken != _CRC:
             self.phase, self.next_tick = _IDLE, _NEVER
             self.drive(0, LOW if self.broken == _SHORT else RELEASED)

@@ -16,8 +16,8 @@ CRYSTALS = pytest.mark.parametrize("hz", [11_059_200, 12_000_000])
 class Bench:
     """A board around a program; `lines` are what it has sent since the last look."""
 
-    def __init__(self, folder, program, parts, hz=11_059_200):
-        image = load_hex(build(folder, (FOLDER / program).read_text("utf-8")))
+    def __init__(self, folder, program, parts, hz=11_059_200, options=()):
+        image = load_hex(build(folder, (FOLDER / program).read_text("utf-8"), *options))
         file = folder / "a.board.toml"
         file.write_text(f'chip = "at89c52"\ncrystal_hz = {hz}\n{parts}')
         self.board = board_of(load_board(str(file)), image)
@@ -82,3 +82,29 @@ def test_a_program_reads_voltages_and_puts_one_out(tmp_path, hz):
     bench.run(100)
     assert bench.lines()[-1] == "2.50 0.00 4.98 3.28 "
     assert (bench.value("adc.aout_v"), bench.value("adc.short_clocks")) == (2.5, 0)
+
+
+@CRYSTALS
+@pytest.mark.parametrize(
+    ("part", "options", "shown"),
+    [("dht11", (), ["37001700", "25003000"]), ("dht22", ("-DDHT22",), ["022b00eb", "017201da"])],
+)
+def test_a_program_reads_humidity_and_degrees(tmp_path, hz, part, options, shown):
+    bench = Bench(
+        tmp_path, "dht.c", f'[parts.air]\npart = "{part}"\npins = {{ data = "P1.3" }}\n', hz, options
+    )
+    bench.put("air.temperature_c", 23.5 - 0.5 * (part == "dht11"))
+    bench.put("air.humidity_percent", 55.5 - 0.5 * (part == "dht11"))
+    bench.run(4500)
+    first, *others = bench.lines()
+    assert (first, others[-1]) == ("silent", shown[0])  # it is asked at once
+    bench.put("air.temperature_c", 47.4 if part == "dht22" else 48)
+    bench.put("air.humidity_percent", 37.0)
+    bench.run(5000)
+    assert bench.lines()[-1] == shown[1]
+    bench.put("air.broken", "sum")
+    bench.run(2500)
+    assert bench.lines()[-1] == "sum"
+    bench.put("air.broken", "missing")
+    bench.run(2500)
+    assert bench.lines()[-1] == "silent"
