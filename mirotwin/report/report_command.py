@@ -6,28 +6,34 @@ from pathlib import Path
 from typing import Annotated
 
 import msgspec
+from msgspec.structs import replace
 
 from miro_exact.bad_input import BadInput, amount
-from miro_exact.clock import CONTROL_PERIOD_TICKS
 from miro_exact.inputs import read_input, replace_file
 from miro_robot.image import Image
 from mirotwin.recording.compare import CompareRule, differences
+from mirotwin.report.page.board_page import board_page
 from mirotwin.report.page.bokeh_page import require_bokeh
 from mirotwin.report.page.document import check_size, place_of_page, write_page
 from mirotwin.report.page.frames import Extras, extras_of
 from mirotwin.report.page.port_page import port_page
 from mirotwin.report.page.run_page import Material, run_page
 from mirotwin.report.page.watched_run import WatchedRun, run_again
+from mirotwin.runs.board_summary import BoardSummary
 from mirotwin.runs.job import Job, load_job
 from mirotwin.runs.summary import Summary
 from mirotwin.shell.command import Argument, Option, Options, command_of
 from mirotwin.shell.debug_files import SourceFolders, checked_sources, source_folders
 from mirotwin.shell.options import FIRMWARE, FORCE, FROM, NAME, OUT, QUIET, TO, Engine
 from mirotwin.shell.outputs import RECORDING, RECORDINGS, file_in
+from mirotwin.shell.part_files import Parts, bring_parts
 from mirotwin.shell.program import complain
 from mirotwin.shell.times import Time, window
 from mirotwin.verify.cases.artifacts import CASES, PAGE, REPORT
 from mirotwin.verify.cases.replay_line import replay_line
+from mirotwin.verify.steps.reading import steps_of
+
+AnySummary = Summary | BoardSummary
 
 SUMMARIES = ("summary.json", "summary.part.json")
 PARQUET = b"PAR1"
@@ -50,16 +56,17 @@ class ReportOptions(Options, frozen=True, kw_only=True):
         ),
     ] = None
     sources: SourceFolders = ()
+    parts: Parts = ()
     force: Annotated[bool, FORCE] = False
     quiet: Annotated[bool, QUIET] = False
     engine: Engine = None
 
-    @property
-    def shown(self) -> range:
+    def shown(self, job: Job) -> range:
         """Numbers of the control periods that are wanted."""
-        from_tick, to_tick = window(self.from_time, self.to_time)
-        last = 1 << 62 if to_tick is None else -(-to_tick // CONTROL_PERIOD_TICKS)
-        return range(from_tick // CONTROL_PERIOD_TICKS, last)
+        scenario = job.spec.scenario
+        from_tick, to_tick = window(self.from_time, self.to_time, scenario.clock)
+        last = 1 << 62 if to_tick is None else -(-to_tick // scenario.period_ticks)
+        return range(from_tick // scenario.period_ticks, last)
 
 
 @command_of(ReportOptions)
@@ -79,6 +86,7 @@ def report(options: ReportOptions) -> int:
         remedy = f"`mirotwin campaign page {subject}` makes its page"
         raise BadInput(subject, "", "holds the results of a campaign", remedy)
     checked_sources(options.sources)
+    bring_parts(options.parts)
     made = page_of(options)
     check_size(made, subject, SMALLER)
     return write_page(place, made, options.quiet)
@@ -96,14 +104,24 @@ def page_of(wanted: ReportOptions, name: str = "") -> bytes:
     """The page, of the failed test `name`, else of a folder's name; of robots at a port, it shows them beside their
     twin. Raises BadInput, and OSError as `open` does.
     """
-    window(wanted.from_time, wanted.to_time)
     file = _file_of(wanted.subject)
     job = load_job(file, wanted.firmware)
-    _ = job.spec.robot_scenario
+    window(wanted.from_time, wanted.to_time, job.spec.scenario.clock)
     complain(*job.notes)
     if job.origin:
         return port_page(job, wanted.quiet)
-    return run_page(_of_recording(wanted, job) if job.recorded else _of_case(wanted, job, name))
+    material = _of_recording(wanted, job) if job.recorded else _of_case(wanted, job, name)
+    return board_page(material, *_ticks_of(wanted, material)) if job.alone else run_page(material)
+
+
+def _ticks_of(wanted: ReportOptions, material: Material) -> tuple[int, int]:
+    """The ticks of a board's run that are wanted and there. Raises BadInput."""
+    from_tick, to_tick = window(wanted.from_time, wanted.to_time, material.job.spec.scenario.clock)
+    end_tick = material.again.result.tick
+    if from_tick >= end_tick:
+        place, reason = f"--from {from_tick}t", f"the run ends at tick {end_tick}"
+        raise BadInput(material.job.spec.origin, place, reason, "look earlier")
+    return from_tick, min(end_tick, to_tick or end_tick)
 
 
 def leave_page(folder: Path, name: str = "") -> None:
@@ -122,16 +140,17 @@ def _file_of(subject: str) -> str:
 
 
 def _of_recording(wanted: ReportOptions, job: Job) -> Material:
-    file, image, shown = job.spec.origin, job.spec.image, wanted.shown
+    file, image, shown = job.spec.origin, job.spec.image, wanted.shown(job)
+    scenario = job.spec.scenario
     recorded = [period for period in job.recorded if period.index in shown]
     if not recorded:
-        first, last = job.recorded[0].tick, (job.recorded[-1].index + 1) * CONTROL_PERIOD_TICKS
-        place = f"--from {window(wanted.from_time, wanted.to_time)[0]}t"
+        first, last = job.recorded[0].tick, (job.recorded[-1].index + 1) * scenario.period_ticks
+        place = f"--from {window(wanted.from_time, wanted.to_time, scenario.clock)[0]}t"
         raise BadInput(file, place, f"the recording goes from tick {first} to {last}", "look within it")
-    end_tick = (recorded[-1].index + 1) * CONTROL_PERIOD_TICKS
-    again = run_again(job, end_tick, wanted.quiet)
+    end_tick = (recorded[-1].index + 1) * scenario.period_ticks
+    summary = _summary(Path(file), job.recorded[-1].digest, BoardSummary if job.alone else Summary)
+    again = run_again(_by_steps(job, summary), end_tick, wanted.quiet)
     extras = extras_of(file, recorded[0].tick, end_tick, not wanted.no_frames)
-    summary = _summary(Path(file), job.recorded[-1].digest)
     notes, replayed_run = [], "This page's own run of it"
     if extras.broken_off:
         count = amount(len(recorded), "control period")
@@ -142,7 +161,8 @@ def _of_recording(wanted: ReportOptions, job: Job) -> Material:
         notes.append(_played_with(image, "recording", job.image))
         replayed_run = f"Another firmware ({image.path.name})"
     # the state of a controller is not computed again, so that digests of states say nothing here
-    changes = differences(job.recorded[: len(again.periods)], again.periods, CompareRule(to_tick=end_tick))
+    rule = CompareRule(to_tick=end_tick, clock=scenario.clock, period_ticks=scenario.period_ticks)
+    changes = differences(job.recorded[: len(again.periods)], again.periods, rule)
     return Material(
         kind="run",
         job=job,
@@ -153,13 +173,14 @@ def _of_recording(wanted: ReportOptions, job: Job) -> Material:
         notes=notes,
         extras=extras,
         replayed=replayed_run,
-        differences=changes,
+        differences=[replace(one, clock=scenario.clock) for one in changes],
         steps=None if summary is None else summary.steps,
     )
 
 
 def _of_case(wanted: ReportOptions, job: Job, name: str) -> Material:
-    _, to_tick = window(wanted.from_time, wanted.to_time)
+    shown = wanted.shown(job)
+    _, to_tick = window(wanted.from_time, wanted.to_time, job.spec.scenario.clock)
     ends = [tick for tick in (job.case.end_tick, to_tick) if tick]
     again = run_again(job, min(ends, default=None), wanted.quiet)
     report = Path(job.spec.origin).with_name(REPORT)
@@ -168,7 +189,7 @@ def _of_case(wanted: ReportOptions, job: Job, name: str) -> Material:
         kind="failed test" if text else "case",
         job=job,
         again=again,
-        periods=[period for period in again.periods if period.index in wanted.shown],
+        periods=[period for period in again.periods if period.index in shown],
         sources=source_folders(job.spec.image, wanted.sources),
         command=_command(wanted, job),
         notes=[
@@ -179,6 +200,14 @@ def _of_case(wanted: ReportOptions, job: Job, name: str) -> Material:
         report=text,
         verdict="failed" if text and not again.result.failures else "",
     )
+
+
+def _by_steps(job: Job, summary: AnySummary | None) -> Job:
+    """The job of a board's run that was driven by its steps alone: by them again, so that the page has their times."""
+    spec, driven = job.spec, summary is not None and summary.steps is not None and summary.live is None
+    if not job.alone or not driven or spec.resumed or job.image is None or job.image.code != spec.image.code:
+        return job
+    return replace(job, spec=replace(spec, script=None, steps=steps_of(spec.scenario, spec.origin)))
 
 
 def _command(wanted: ReportOptions, job: Job) -> str:
@@ -203,13 +232,13 @@ def _verdict_note(job: Job, again: WatchedRun) -> list[str]:
     return [f"What was recorded{now}. Recorded: {verdict}"]
 
 
-def _summary(recording: Path, digest: str) -> Summary | None:
+def _summary(recording: Path, digest: str, kind: type[Summary] | type[BoardSummary]) -> AnySummary | None:
     """The summary beside the recording, if it is of the run with this digest and can be read; else None."""
     for name in SUMMARIES:
         path = recording.with_name(name)
         if path.is_file():
             try:
-                summary = msgspec.json.decode(read_input(path), type=Summary)
+                summary = msgspec.json.decode(read_input(path), type=kind)
             except (msgspec.DecodeError, BadInput):
                 continue
             if summary.digest == digest:

@@ -26,8 +26,7 @@ class Result(msgspec.Struct, frozen=True, kw_only=True):
 
     `expectations`: of all checks. `done` of `steps`; `unseen`: steps and expectations that no port shows. `tick`: where
     the run ended; `clock`: ticks per second. `left`: the folder with its case; `left_out`: what settings left out,
-    a line each. `again`: the command that gives the verdict again; `error`: why there was no run. `alone`: it is of a
-    board, of which there is no page.
+    a line each. `again`: the command that gives the verdict again; `error`: why there was no run.
     """
 
     path: str = ""
@@ -47,7 +46,6 @@ class Result(msgspec.Struct, frozen=True, kw_only=True):
     left_out: Sequence[str] = ()
     again: str = ""
     error: Exception | None = None
-    alone: bool = False
 
     @property
     def code(self) -> int:

@@ -113,13 +113,17 @@ class Run:
                 self.drive(recorder, source.record == "full", keep, move)
 
     def play(self, progress: Callable[[int], object] = lambda tick: None) -> Run:
-        """To its end, which may be within a control period. `progress` gets the tick.
+        """To its end, which may be within a control period; with steps, that of its scenario. `progress` gets the tick.
 
         Raises TransmissionError for a script that cannot be sent.
         """
         world, until_tick = self.world, self.spec.until_tick
         world.observers.append(self.periods.append)
-        self._go_to(world.scenario.end_tick if until_tick is None else until_tick, progress)
+        if self.player is not None:
+            world.observers.append(lambda period: progress(world.tick))
+            self.player.run()
+        else:
+            self._go_to(world.scenario.end_tick if until_tick is None else until_tick, progress)
         if self.checks.sleep is not None:
             self._let_answer(self.checks.sleep, progress)
         self.finish()
@@ -190,7 +194,6 @@ class Run:
             seed=self.spec.seed,
             digest=world.digest,
             firmware_sha256=world.image.sha256 or "",
-            alone=isinstance(world.scenario, BoardScenario),
         )
 
     # As files

@@ -105,8 +105,7 @@ def _with_artifacts(run: Run, case: str | None, result: Result, folder: Path, te
     try:
         run.keep_saved(folder)
         if failed:
-            page = [] if result.alone else [report_line(str(folder))]
-            lines = (result.path, *result.lines, *result.notes, *page, result.again)
+            lines = (result.path, *result.lines, *result.notes, report_line(str(folder)), result.again)
             case = case or (run.case() if run.failures else None)
             files = stream_files(case, run.stream(), run.spec.image)
             leave(folder, "\n".join((*lines, "")), {SCENARIO: encodable(text.text).encode(), **files})

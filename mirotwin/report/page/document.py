@@ -90,5 +90,5 @@ def number(value: float | None, digits: int = 4) -> str:
     return "\u2013" if value is None else f"{value:.{digits}g}"
 
 
-def seconds_text(tick: int) -> str:
-    return f"{tick / TICKS_PER_SECOND:.3f} s"
+def seconds_text(tick: int, clock: int = TICKS_PER_SECOND) -> str:
+    return f"{tick / clock:.3f} s"

@@ -6,7 +6,7 @@ those of one robot at a time.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from typing import Any
 
 import numpy as np
@@ -54,7 +54,7 @@ def figures_of(tracks: PageTracks, marks: Sequence[LinkMark], failure_ticks: Seq
     for side in SIDES:
         made[f"plot-{side}"] = _wheel(tracks, times, side)
     if marks:
-        made["plot-link"] = _link(marks, times)
+        made["plot-link"] = lanes_figure(marks, times)
     marked = list(dict.fromkeys(tick / TICKS_PER_SECOND for tick in failure_ticks))[:MOST_FAILURES]
     for figure in made.values():
         add_failures(figure, marked)
@@ -124,8 +124,14 @@ def _widen(made: Any, number: int, tracks: PageTracks, least: float, *columns: A
         _of_robot(points, number)
 
 
-def _link(marks: Sequence[LinkMark], times: Any) -> Any:
-    lanes = lanes_of(marks)
+def lanes_figure(
+    marks: Sequence[LinkMark],
+    times: Any,
+    seconds_of: Callable[[Any], Any] | None = None,
+    colours: Mapping[str, str] = KIND_COLOURS,
+) -> Any:
+    """Marks on their lanes. `seconds_of` ticks of another crystal than the robot's; `colours` of other kinds."""
+    lanes, seconds_of = lanes_of(marks), seconds_of or _times
     made = panel(
         "",
         times,
@@ -136,15 +142,15 @@ def _link(marks: Sequence[LinkMark], times: Any) -> Any:
     made.yaxis[0].major_label_text_align = "left"
     made.ygrid[0].visible = False
     made.min_border_left = 120
-    for kind, colour in KIND_COLOURS.items():
+    for kind, colour in colours.items():
         shown = [mark for mark in marks if mark.kind == kind]
         if not shown:
             continue
         source = ColumnDataSource(
             {
                 "lane": [mark.lane for mark in shown],
-                "left": _times([mark.start_tick for mark in shown]),
-                "right": _times([mark.end_tick for mark in shown]),
+                "left": seconds_of([mark.start_tick for mark in shown]),
+                "right": seconds_of([mark.end_tick for mark in shown]),
             }
         )
         bars = made.hbar(y="lane", left="left", right="right", source=source, name=f"link:{kind}")

@@ -14,7 +14,7 @@ import numpy as np
 import tomli_w
 
 from miro_exact.bad_input import amount
-from miro_exact.clock import CONTROL_PERIOD_TICKS, TICKS_PER_SECOND
+from miro_exact.clock import CONTROL_PERIOD_TICKS, CYCLE_TICKS, TICKS_PER_SECOND
 from miro_robot.image.debug_info import Sources
 from miro_sim.periods import Period
 from miro_sim.pitch import ground
@@ -75,24 +75,34 @@ def run_page(material: Material) -> bytes:
     figures = figures_of(tracks, marks, list(filter(tracks.shows, ticks)))
     kinds = {mark.kind for mark in marks}
     values = {
-        "about": material,
-        "file": Path(material.job.spec.origin).name,
-        "scenario": scenario,
-        "firmware": material.job.spec.image.path.name,
+        **shared(material, TICKS_PER_SECOND),
         "scenario_text": tomli_w.dumps(tables_of(scenario)),
-        "verdict": _verdict(material),
         "told": any(value == value for robot in tracks.robots for value in robot.told_v_m_s),
         "facts": _facts(material, tracks),
         "tracks": tracks,
         "pitch": pitch_of(tracks),
-        "again": again,
         "kinds": [(kind, colour) for kind, colour in KIND_COLOURS.items() if kind in kinds],
         "lanes": [(lane, Counter(one.kind for one in marks if one.lane == lane)) for lane in lanes_of(marks)],
+    }
+    return render("run.html", figures, _data(tracks, marks, material.extras.frames, ticks), values)
+
+
+def shared(material: Material, clock: int) -> dict[str, Any]:
+    """The values of the sections that pages of robots and of boards have."""
+    again = material.again
+    return {
+        "about": material,
+        "again": again,
+        "clock": clock,
+        "cycle_us": f"{1e6 * CYCLE_TICKS / clock:.4g}",
+        "file": Path(material.job.spec.origin).name,
+        "scenario": material.job.spec.scenario,
+        "firmware": material.job.spec.image.path.name,
+        "verdict": _verdict(material),
         "interrupts": [one for one in again.profile.interrupts if one.count],
         "coverage": coverage_rows(again.image, again.counts, material.sources),
         "channels": first_per_channel(material.differences),
     }
-    return render("run.html", figures, _data(tracks, marks, material.extras.frames, ticks), values)
 
 
 class Pitch(msgspec.Struct, frozen=True):

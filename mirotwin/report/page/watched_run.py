@@ -5,6 +5,8 @@ The first robot's processor is watched instruction by instruction; the bits of t
 
 from __future__ import annotations
 
+from itertools import accumulate
+
 import msgspec
 
 from miro_robot.faults import FirmwareFault
@@ -15,6 +17,7 @@ from miro_robot.inspect.profile import Profile
 from miro_robot.inspect.profile import profile as profile_of
 from miro_robot.inspect.watcher import attach, detach
 from miro_sim.periods import Period
+from mirotwin.report.page.board_watch import BoardWatch
 from mirotwin.report.page.link import LinkLog, LinkMark
 from mirotwin.runs.job import Job
 from mirotwin.runs.result import Result
@@ -22,11 +25,13 @@ from mirotwin.runs.run import Run, replaying
 from mirotwin.shell.debug_files import with_debug_files
 from mirotwin.shell.options import plain_parameters
 from mirotwin.shell.progress import ProgressBar
+from mirotwin.verify.steps.player import Player
 
 
 class WatchedRun(msgspec.Struct, frozen=True):
     """`digest`: at the end of the last of `periods`; `faults`: network, slot, fault. `image` has its debug files where
-    they are; `robot`: whose processor was watched.
+    they are; `robot`: whose processor was watched. `steps`, of a run that was driven by them: begin, end, what, whether
+    it failed. `watch`: of a board.
     """
 
     result: Result
@@ -38,6 +43,8 @@ class WatchedRun(msgspec.Struct, frozen=True):
     robot: str
     profile: Profile
     counts: Counts
+    steps: list[tuple[int, int, str, bool]]
+    watch: BoardWatch | None
 
 
 def run_again(job: Job, until_tick: int | None, quiet: bool) -> WatchedRun:
@@ -47,7 +54,9 @@ def run_again(job: Job, until_tick: int | None, quiet: bool) -> WatchedRun:
         world = spec.world()
     log = LinkLog(world)
     counters, activity = Counters(), Activity()
-    cpu = world.networks[0].robots[0].board.cpu
+    device = world.devices[0]
+    watch = None if world.robots else BoardWatch(world)
+    cpu = device.board.cpu
     attach(cpu, counters, activity)
     total = until_tick or spec.scenario.end_tick
     with ProgressBar("running it again", total, quiet) as bar, replaying(spec.origin, world):
@@ -56,15 +65,23 @@ def run_again(job: Job, until_tick: int | None, quiet: bool) -> WatchedRun:
         if not world.stopped and world.in_period:
             world.run_to(world.period_end)
     image = with_debug_files(world.image)
-    place = world.networks[0].index, world.networks[0].robots[0].slot
     return WatchedRun(
         result=again.result(),
         periods=again.periods,
         digest=world.digest,
-        faults=[(robot.network, robot.slot, one) for robot in world.robots for one in robot.board.faults],
+        faults=[(robot.network, robot.slot, one) for robot in world.devices for one in robot.board.faults],
         marks=log.marks(),
         image=image,
-        robot=f"net{place[0]}/robot{place[1]}",
+        robot=f"net{device.network}/robot{device.slot}" if watch is None else spec.scenario.name,
         profile=profile_of(image, counters, activity),
         counts=counts_of(counters),
+        steps=[] if again.player is None else _times(again.player),
+        watch=watch,
     )
+
+
+def _times(player: Player) -> list[tuple[int, int, str, bool]]:
+    took, failure = player.took_ticks, player.failure
+    done = zip(took, accumulate(took), player.steps, strict=False)
+    times = [(end - ticks, end, f"{step}", False) for ticks, end, step in done]
+    return times + ([] if failure is None else [(failure.begun_tick, failure.tick, failure.step, True)])

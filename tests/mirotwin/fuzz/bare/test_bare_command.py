@@ -137,7 +137,6 @@ def test_a_case_of_a_bare_processor_is_not_played_on_the_robot(mirotwin, engines
             ("replay", case, *firmware, "--port", "/dev/null"),
             "--port: is for robots, and this is for a board",
         ),
-        (("report", case, "--firmware", hexes["sleeps"]), "is for a board alone, which has no robot to show"),
     ):
         code, _, err = mirotwin(*arguments)
         assert (code, said in err) == (2, True), err

@@ -1,0 +1,149 @@
+// The time of a board's page: the slider, what it moves, the keys. `window.run.show(index)` shows a moment.
+(() => {
+  "use strict";
+  const data = JSON.parse(document.getElementById("page-data").textContent);
+  const byId = (id) => document.getElementById(id);
+  const all = (selector) => [...document.querySelectorAll(selector)];
+  const slider = byId("time");
+  const last = Number(slider.max);
+  const run = { index: 0, last, show };
+  window.run = run;
+
+  const tickOf = (index) => Math.min(data.end, data.first + index * data.step);
+  const indexAt = (tick) => Math.ceil((tick - data.first) / data.step);
+  const inSeconds = (tick) => `${(tick / data.ticks_per_s).toFixed(3)} s`;
+
+  // The number of entries of a sorted list that are not later.
+  function passed(ticks, tick) {
+    let low = 0, high = ticks.length;
+    while (low < high) {
+      const middle = (low + high) >> 1;
+      if (ticks[middle] <= tick) low = middle + 1; else high = middle;
+    }
+    return low;
+  }
+
+  const said = (value) => typeof value !== "number" ? `${value}` : Number.isInteger(value) ? `${value}` : `${Number(value.toPrecision(5))}`;
+  const valueAt = (path, tick) => {
+    const [ticks, values] = data.values[path];
+    return values[Math.max(0, passed(ticks, tick) - 1)];
+  };
+
+  const cells = all("[data-path]");
+  for (const cell of cells.filter((one) => "end" in one.dataset)) cell.textContent = said(valueAt(cell.dataset.path, data.end));
+  const moving = cells.filter((one) => !("end" in one.dataset));
+  const moments = all(".moment");
+  const rows = all(".serial tr[data-tick]");
+  const rowTicks = rows.map((row) => Number(row.dataset.tick));
+
+  function tellEvents(tick) {
+    const list = byId("events-now");
+    if (!list) return;
+    const near = data.marks.filter(([from]) => from <= tick).slice(-5);
+    const next = data.marks.filter(([from]) => from > tick).slice(0, 2);
+    list.replaceChildren(...[...near, ...next].map(([from, lane, kind, text]) => {
+      const item = document.createElement("li");
+      item.className = `kind-${kind}${from > tick ? " ahead" : ""}`;
+      item.textContent = `${inSeconds(from)}  ${lane}: ${text}`;
+      return item;
+    }));
+  }
+
+  function show(wanted) {
+    const index = Math.max(0, Math.min(last, Math.round(wanted)));
+    const tick = tickOf(index);
+    run.index = index;
+    slider.value = `${index}`;
+    slider.setAttribute("aria-valuetext", inSeconds(tick));
+    byId("clock").textContent = inSeconds(tick);
+    for (const moment of moments) moment.textContent = inSeconds(tick);
+    for (const cell of moving) cell.textContent = said(valueAt(cell.dataset.path, tick));
+    const current = passed(rowTicks, tick) - 1;
+    rows.forEach((row, at) => { row.classList.toggle("past", at <= current); row.classList.toggle("current", at === current); });
+    tellEvents(tick);
+    for (const cursor of window.plots.cursors) cursor.location = tick / data.ticks_per_s;
+    document.dispatchEvent(new CustomEvent("moment", { detail: tick }));
+  }
+
+  slider.addEventListener("input", () => { stop(); show(slider.valueAsNumber); });
+  document.addEventListener("click", (event) => {
+    const button = event.target.closest(".jump");
+    if (button) { stop(); show(indexAt(Number(button.dataset.tick))); }
+  });
+
+  let began = null;
+  const play = byId("play");
+  function stop() {
+    began = null;
+    play.setAttribute("aria-pressed", "false");
+    play.setAttribute("aria-label", "Play");
+  }
+  function frame(now) {
+    if (began === null) return;
+    const ticks = ((now - began.at) * Number(byId("speed").value) * data.ticks_per_s) / 1000;
+    const index = began.index + Math.floor(ticks / data.step);
+    if (index !== run.index) show(index);
+    if (index >= last) stop(); else requestAnimationFrame(frame);
+  }
+  function toggle() {
+    if (began !== null) { stop(); return; }
+    if (run.index >= last) show(0);
+    play.setAttribute("aria-pressed", "true");
+    play.setAttribute("aria-label", "Pause");
+    began = { index: run.index, at: performance.now() };
+    requestAnimationFrame(frame);
+  }
+  play.addEventListener("click", toggle);
+  byId("speed").addEventListener("change", () => { if (began) began = { index: run.index, at: performance.now() }; });
+
+  const begins = [...new Set(data.marks.map(([from]) => indexAt(from)))].sort((one, other) => one - other);
+  const next = () => begins.find((at) => at > run.index) ?? last;
+  const before = () => begins.findLast((at) => at < run.index) ?? 0;
+  const MOVES = {
+    ArrowRight: (far) => far ? next() : run.index + 1, ArrowUp: () => run.index + 1,
+    ArrowLeft: (far) => far ? before() : run.index - 1, ArrowDown: () => run.index - 1,
+    Home: () => 0, End: () => last,
+  };
+  document.addEventListener("keydown", (event) => {
+    if (event.ctrlKey || event.metaKey || event.altKey || event.target.closest("select, textarea")) return;
+    const vertical = event.key === "ArrowUp" || event.key === "ArrowDown";
+    if (event.key in MOVES && (event.target === slider || !vertical)) {
+      event.preventDefault();
+      stop();
+      show(MOVES[event.key](event.shiftKey));
+    } else if (event.key === " " && !event.target.closest("button, summary, a")) {
+      event.preventDefault();
+      toggle();
+    }
+  });
+
+  for (const tick of data.failures) {
+    const mark = document.createElement("i");
+    mark.style.left = `${(100 * Math.max(0, Math.min(last, indexAt(tick)))) / Math.max(1, last)}%`;
+    byId("marks").append(mark);
+  }
+
+  const begin = () => show(data.failures.length ? indexAt(data.failures[0]) : 0);
+  begin();
+  const narrow = matchMedia("(max-width: 700px)");
+  const label = () => {
+    for (const [name, plot] of Object.entries(window.plots.figures)) if (name.startsWith("plot-value")) plot.min_border_left = narrow.matches ? 60 : 136;
+    for (const model of window.plots.models) if (model.tags.includes("wide")) model.visible = !narrow.matches;
+  };
+  narrow.addEventListener("change", label);
+  window.plots.ready.then(() => {
+    for (const [name, plot] of Object.entries(window.plots.figures)) {
+      byId(name).addEventListener("click", (event) => {
+        if (event.target.closest?.(".bk-Toolbar, button")) return;
+        const view = Bokeh.index.find_one?.(plot) ?? [...Bokeh.index].find((one) => one.model === plot);
+        const box = view?.canvas_view?.el.getBoundingClientRect();
+        if (!box) return;
+        stop();
+        show(indexAt(view.frame.x_scale.invert(event.clientX - box.left) * data.ticks_per_s));
+      });
+    }
+    label();
+    show(run.index);
+    document.body.dataset.ready = "true";
+  });
+})();

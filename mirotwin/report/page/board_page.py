@@ -1,0 +1,187 @@
+"""The page of a board's run: its sections, and the data that its JavaScript moves."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from itertools import pairwise
+from typing import Any, NamedTuple
+
+import tomli_w
+
+from miro_exact.clock import CHARACTER_BITS
+from miro_protocol.actions import Put
+from miro_protocol.transmission import DOWN, Transmission
+from miro_sim.scenario.board import BoardScenario
+from miro_sim.scenario.board_scenario import tables_of_board
+from mirotwin.report.page.axes import ROBOT_COLOURS
+from mirotwin.report.page.board_watch import Changed
+from mirotwin.report.page.document import render
+from mirotwin.report.page.link import LinkMark
+from mirotwin.report.page.run_page import Material, shared
+from mirotwin.shell.json_text import json_bytes
+
+MOST_LANES = 32
+"""Nets that are drawn: those with most edges, in the order of the board; those with as many as the last one, too."""
+MOST_ROWS = 400
+"""Largest number of lines of serial text that are listed."""
+LONGEST_ROW = 80
+TOGETHER_MS, MARK_MS, STEP_MS = 20, 1, 1
+"""Characters with a longer pause between them are two lines; so wide is what takes no time; a step of the slider."""
+MOST_STEPS = 20_000
+
+
+class SerialRow(NamedTuple):
+    """Characters one way."""
+
+    tick: int
+    direction: str
+    data: bytes
+
+    @property
+    def text(self) -> str:
+        """With escapes."""
+        return repr(self.data.decode("latin-1"))[1:-1]
+
+
+def board_page(material: Material, first_tick: int, end_tick: int) -> bytes:
+    """The page of these ticks. Raises BadInput where Bokeh is not installed."""
+    from mirotwin.report.page.board_plots import Window, board_figures  # loads Bokeh
+
+    scenario, again = material.job.spec.scenario, material.again
+    assert isinstance(scenario, BoardScenario)
+    assert again.watch is not None
+    window = Window(first_tick, end_tick, scenario.clock)
+    waves, values = again.watch.waves(first_tick, end_tick), again.watch.values(first_tick, end_tick)
+    least = min(sorted(len(wave.ticks) for wave in waves)[-MOST_LANES:], default=0)
+    pins = [wave for wave in waves if len(wave.ticks) >= least]
+    displays = [one for one in values if one.path.endswith(".text") and isinstance(one.values[0], str)]
+    rows_of = tuple(f"{one.path.removesuffix('text')}row" for one in displays)
+    beside = [one for one in values if one not in displays and not one.path.startswith(rows_of)]
+    moved = [one for one in values if one.changes and (one in beside or one in displays)]
+    curves = _together([one for one in moved if not _is_state(one)], scenario)
+    wire = [one for period in material.periods for one in period.wire if first_tick <= one.tick < end_tick]
+    marks = _marks(material, wire, scenario)
+    marks = [one for one in marks if first_tick <= one.end_tick and one.start_tick < end_tick]
+    ticks = [*(one.tick for one in again.result.failures), *(fault.tick for _, _, fault in again.faults)]
+    figures = board_figures(
+        window,
+        marks,
+        pins,
+        curves,
+        [mark for one in moved if _is_state(one) for mark in _state_marks(one, end_tick)],
+        [tick for tick in dict.fromkeys(ticks) if first_tick <= tick < end_tick],
+    )
+    rows, step = (
+        _rows(wire, scenario.clock),
+        max(scenario.clock * STEP_MS // 1000, window.span // MOST_STEPS),
+    )
+    data = {
+        "ticks_per_s": scenario.clock,
+        "first": first_tick,
+        "end": end_tick,
+        "step": step,
+        "failures": sorted(set(ticks)),
+        "marks": [(one.start_tick, one.lane, one.kind, one.text) for one in sorted(marks, key=_begin)],
+        "values": {one.path: (one.ticks, [_plain(value) for value in one.values]) for one in values},
+    }
+    sections = {
+        **shared(material, scenario.clock),
+        "scenario_text": tomli_w.dumps(tables_of_board(scenario)),
+        "last_index": -(-window.span // step),
+        "span_s": f"{window.span / scenario.clock:.3f}",
+        "sent_to_it": sum(len(row.data) for row in rows if row.direction == DOWN),
+        "it_sent": sum(len(row.data) for row in rows if row.direction != DOWN),
+        "rows": rows,
+        "most_rows": MOST_ROWS,
+        "waves": waves,
+        "pins": [wave.name for wave in pins],
+        "close": [wave.name for wave in pins if len(wave.drawn(window.span)[1])],
+        "thinned": [one.path for one in values if len(one.ticks) <= one.changes],
+        "curves": curves,
+        "displays": displays,
+        "beside": beside,
+        "cars": [],
+    }
+    return render("board.html", figures, json_bytes(data), sections)
+
+
+def _is_state(one: Changed) -> bool:
+    """Whether it is a text, or on and off."""
+    return all(
+        isinstance(value, str) or (type(value) is not float and value in (0, 1)) for value in one.values
+    )
+
+
+def _together(numbers: Sequence[Changed], scenario: BoardScenario) -> list[list[Changed]]:
+    """Values of one key of parts of one kind in one figure, as long as there are colours."""
+    groups: dict[tuple[str, str], list[Changed]] = {}
+    for one in numbers:
+        kind = scenario.parts[one.path.partition(".")[0]].name
+        groups.setdefault((kind, one.path.rpartition(".")[2]), []).append(one)
+    most = len(ROBOT_COLOURS)
+    return [some[at : at + most] for some in groups.values() for at in range(0, len(some), most)]
+
+
+def _rows(wire: Sequence[Transmission], clock: int) -> list[SerialRow]:
+    """What was sent, each way in lines: to a line end, a pause, or what went the other way."""
+    rows: list[SerialRow] = []
+    last_tick = 0
+    for sent in sorted(wire, key=lambda one: one.tick):
+        near = sent.tick - last_tick < clock * TOGETHER_MS // 1000
+        last_tick = sent.tick
+        if near and rows[-1:] and rows[-1].direction == sent.direction:
+            rows[-1] = rows[-1]._replace(data=rows[-1].data + sent.data)
+        else:
+            rows.append(SerialRow(sent.tick, sent.direction, sent.data))
+    return [
+        row._replace(data=line[at : at + LONGEST_ROW])
+        for row in rows
+        for line in row.data.splitlines(keepends=True)
+        for at in range(0, len(line), LONGEST_ROW)
+    ]
+
+
+def _marks(material: Material, wire: Sequence[Transmission], scenario: BoardScenario) -> list[LinkMark]:
+    """Steps, what was done, characters and faults, each on its lane."""
+    short = scenario.clock * MARK_MS // 1000
+    bit = scenario.host_bit_ticks or scenario.clock // 9600
+    marks = [
+        LinkMark("steps", "damaged" if failed else ("fresh", "repeated")[number % 2], begin, end, text)
+        for number, (begin, end, text, failed) in enumerate(material.again.steps)
+    ]
+    for action in (action for period in material.periods for action in period.actions):
+        lane, text = ("put", action.text) if isinstance(action, Put) else ("done to it", f"{action}")
+        marks.append(LinkMark(lane, "action", action.tick, action.tick + short, text))
+    for sent in wire:
+        lane, kind = ("sent to it", "sent") if sent.direction == DOWN else ("it sends", "answer")
+        end, text = sent.tick + CHARACTER_BITS * bit * len(sent.data), SerialRow(0, "", sent.data).text
+        marks.append(LinkMark(lane, kind, sent.tick, end, text))
+    for _, _, fault in material.again.faults:
+        marks.append(LinkMark("faults", "damaged", fault.tick, fault.tick + short, f"{fault}"))
+    return marks
+
+
+def _begin(mark: LinkMark) -> int:
+    return mark.start_tick
+
+
+def _state_marks(one: Changed, end_tick: int) -> list[LinkMark]:
+    """A bar for each text, equal ones of one colour, and for each time that something is on."""
+    seen = list(dict.fromkeys(one.values))
+    return [
+        LinkMark(one.path, ROBOT_COLOURS[seen.index(value) % len(ROBOT_COLOURS)], begin, end, _short(value))
+        for (begin, end), value in zip(pairwise([*one.ticks, end_tick]), one.values, strict=True)
+        if value
+    ]
+
+
+def _short(value: Any) -> str:
+    """A text of several rows in one."""
+    rows = (row.strip() for row in value.split("\n")) if isinstance(value, str) else ("on",)
+    return " / ".join(row for row in rows if row)
+
+
+def _plain(value: Any) -> Any:
+    """A number that JSON does not have, as text."""
+    return value if not isinstance(value, float) or math.isfinite(value) else f"{value}"

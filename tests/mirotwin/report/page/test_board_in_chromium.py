@@ -1,0 +1,57 @@
+"""Pages of boards in a browser: the slider moves displays and values, all fits on a phone, nothing is complained of."""
+
+from pathlib import Path
+
+import pytest
+
+from tests.mirotwin.report.page import browser
+from tests.mirotwin.report.page.browser import chromium, open_page
+
+pytest.importorskip("selenium", reason=browser.MISSING)
+
+pytestmark = [pytest.mark.slow, pytest.mark.skipif(bool(browser.MISSING), reason=browser.MISSING)]
+ROVER = Path(__file__).parents[4] / "examples/boards/rover/pause.scenario.toml"
+
+
+@pytest.fixture(scope="module")
+def page(mirotwin, tmp_path_factory):
+    folder = tmp_path_factory.mktemp("rover")
+    mirotwin.succeeds("run", ROVER, "--out", folder / "run", "-q")
+    mirotwin.succeeds("report", folder / "run", "-o", folder / "page.html", "-q")
+    return folder / "page.html"
+
+
+@pytest.fixture(scope="module")
+def driver():
+    with chromium() as found:
+        yield found
+
+
+def text(driver, selector):
+    return driver.execute_script("return document.querySelector(arguments[0]).textContent", selector)
+
+
+def test_the_slider_moves_the_display_and_the_values(driver, page):
+    open_page(driver, page)
+    assert text(driver, ".glass[data-path='lcd.text']").strip() == ""
+    driver.execute_script("run.show(220)")
+    assert text(driver, ".glass[data-path='lcd.text']").split() == ["150", "cm", "ahead"]
+    assert text(driver, "#now [data-path='ahead.on']") in ("1", "true")
+    assert text(driver, "#clock") == text(driver, "#now .moment") == "0.220 s"
+    driver.execute_script("run.show(run.last)")
+    assert text(driver, "#now [data-path='eyes.echo']") == "none"
+
+
+def test_a_jump_goes_to_the_tick_of_a_character(driver, page):
+    open_page(driver, page)
+    driver.execute_script("document.querySelector('.serial .jump').click()")
+    assert text(driver, ".serial tr.current .said") == "SA"
+
+
+@pytest.mark.parametrize("theme", ["light", "dark"])
+@pytest.mark.parametrize("width", [1400, 360])
+def test_all_fits_into_the_window(driver, page, theme, width):
+    open_page(driver, page, theme, width)
+    assert driver.execute_script("return document.documentElement.scrollWidth") == width
+    said = [one["message"] for one in driver.get_log("browser")]
+    assert not [one for one in said if "document idle" not in one and "setting log level" not in one]
