@@ -6,7 +6,7 @@ for ever, 10 ms (at 24 MHz) after the last character, unless a time is given.
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 from operator import attrgetter
 from typing import Any
 
@@ -15,9 +15,9 @@ from msgspec.structs import replace
 from miro_exact.bad_input import BadInput
 from miro_exact.clock import CHARACTER_BITS, CYCLE_TICKS
 from miro_exact.raised import raised
-from miro_protocol.actions import Put, ScriptItem
-from miro_protocol.protocol import Protocol
-from miro_protocol.transmission import Transmission
+from miro_protocol.actions import Put, Reset, ScriptItem
+from miro_protocol.protocol import Frame, Protocol
+from miro_protocol.transmission import DOWN, Transmission
 from miro_robot.board_spec import CRYSTAL_HZ
 from miro_robot.harness.harness import AWAKE, SETTLE_TICKS, Harness
 from miro_robot.harness.program import INPUTS, Program
@@ -26,6 +26,7 @@ from miro_robot.image import SPACE_BYTES, Image
 from miro_robot.mcs51.chips import CHIPS
 from miro_sim.scenario.board_scenario import board_of_tables
 from miro_sim.world.events import Event
+from mirotwin.fuzz.inputs import RESET, SILENCE, raw, waited
 from mirotwin.fuzz.processor import BOOT_MS, bit_ticks_of, powered
 from mirotwin.fuzz.protocols import called, protocol_named, shown
 from mirotwin.fuzz.spec import TargetSpec
@@ -43,6 +44,10 @@ NO_FAULT = "no_fault"
 NO_FAULT_CODE, NEVER_SLEEPS_CODE, CHECK_CODE = 1, 2, 3
 MOST_OF_A_BODY = 32
 """Bytes of a body in a seed; the harness's program has a form for longer ones, which a fuzzer triage."""
+MOST_PUT_SEEDS = 64
+PUT, WAIT = b"\x01", bytes([SILENCE, 19])
+_BITS = (b"\0\0", b"\x01\0", b"\xff\x7f", b"\xfe\xff", b"\xff\xff")
+"""Of a put in a seed: the ends and the middle of a number, and four words."""
 _SEEN = ("received", "transmitted")
 _BY_TICK = attrgetter("tick")
 
@@ -223,7 +228,47 @@ class BoardTarget(Target):
             each = [self._repaired(body) for body in samples]
         else:
             each = [frame_input(body, self.input) for body in samples]
-        return list(dict.fromkeys([*each, b"".join(each)]))
+        puts = [PUT + bytes([which]) + bits + WAIT for which in range(self.program.choices) for bits in _BITS]
+        own = puts[:MOST_PUT_SEEDS] if self.input == "session" else []
+        played = [] if self.wired is None else self.inputs_of(self.wired.played())
+        return list(dict.fromkeys([*each, b"".join(each), *played, *own]))
+
+    def inputs_of(self, happened: Iterable[ScriptItem]) -> list[bytes]:
+        """One input; of a class other than a session it has the characters alone. Of a frame it has what it carries."""
+        items = [item for item in happened if not isinstance(item, Transmission) or item.direction == DOWN]
+        texts = [item.data for item in items if isinstance(item, Transmission)]
+        if self.input != "session":
+            whole = b"".join(texts) if self.input == "bytes" else b"".join(map(self._operations, texts))
+            return [whole] if whole else []
+        data, end_tick = bytearray(), items[0].tick if items else 0
+        for item in items:
+            data += waited(item.tick - end_tick)
+            end_tick = item.tick
+            if isinstance(item, Transmission):
+                data += self._operations(item.data)
+                end_tick += CHARACTER_BITS * self.harness.bit_ticks * len(item.data)
+            elif isinstance(item, Reset) and item.level:
+                data.append(RESET)
+            elif isinstance(item, Put) and self.wired is not None:
+                which = [path for path, _ in self.wired.choices].index(item.path)
+                data += PUT + bytes([which]) + self.wired.bits_of(which, item.value).to_bytes(2, "little")
+        return [bytes(data)] if data else []
+
+    def _operations(self, characters: bytes) -> bytes:
+        """The frames in these characters as what they carry, and all else as characters, which only a session has."""
+        protocol = self.protocol
+        frames = (
+            [] if protocol is None else called(protocol.decode, lambda: list(protocol.decode(characters)))
+        )
+        data, begin = b"", 0
+        for frame in frames:
+            if isinstance(frame, Frame) and len(frame.body) <= MOST_OF_A_BODY:
+                between = characters[begin : frame.start]
+                data += (raw(between) if self.input == "session" else b"") + frame_input(
+                    frame.body, self.input
+                )
+                begin = frame.end
+        return data + (raw(characters[begin:]) if self.input == "session" else b"")
 
     def note(self) -> str:
         """From when on inputs are played, for people."""
@@ -288,7 +333,7 @@ def wired_target(spec: TargetSpec) -> BoardTarget:
     as_settings(spec.expected)  # checks in files are known by their names from here on
     scenario = board_of_tables(dict(tables or {}), "").scenario
     image = load_firmware(spec.image, CHIPS[scenario.board.chip].flash_bytes, named=False)
-    machine = WiredMachine(scenario, image, steps_of(scenario, "")[: steps or 0], boot_ms or 0)
+    machine = WiredMachine(scenario, image, steps_of(scenario, ""), steps or 0, boot_ms or 0)
     target = BoardTarget(
         image,
         spec.input,

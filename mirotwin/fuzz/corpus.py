@@ -7,14 +7,13 @@ nothing is an input is refused.
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Callable, Iterable, Iterator
 from pathlib import Path
 
 from miro_exact.bad_input import BadInput, amount
 from miro_exact.inputs import TEXT_BYTES
 from miro_protocol import stream
 from miro_protocol.actions import ScriptItem
-from mirotwin.fuzz.inputs import inputs_of
 from mirotwin.recording.capture.detect import TIMED, detect
 from mirotwin.recording.capture.input import Input
 from mirotwin.recording.capture.source import READ_ERRORS, open_source
@@ -34,8 +33,12 @@ MOST = 2000
 """Inputs that are taken from a folder."""
 
 
-def read_corpus(folder: Path, kind: str, robots: int) -> tuple[list[bytes], list[str]]:
-    """The inputs of that kind in a folder, no two the same, and notes for the user about files that are none.
+Convert = Callable[[Iterable[ScriptItem]], list[bytes]]
+"""Makes inputs of what was sent and done."""
+
+
+def read_corpus(folder: Path, convert: Convert) -> tuple[list[bytes], list[str]]:
+    """The inputs in a folder, no two the same, and notes for the user about files that are none.
 
     Raises BadInput where there are none.
     """
@@ -48,7 +51,7 @@ def read_corpus(folder: Path, kind: str, robots: int) -> tuple[list[bytes], list
     files = list(_files(folder))
     for path in files:
         try:
-            taken = _inputs_in(path, kind, robots)
+            taken = _inputs_in(path, convert)
         except (*READ_ERRORS, OSError) as error:
             notes.append(f"{OPTION}: passed over: {error}")
             continue
@@ -77,7 +80,7 @@ def _files(folder: Path) -> Iterator[Path]:
             yield from (path for path in sorted(place.iterdir()) if path.is_file() and path.name[0] != ".")
 
 
-def _inputs_in(path: Path, kind: str, robots: int) -> list[bytes]:
+def _inputs_in(path: Path, convert: Convert) -> list[bytes]:
     """The content of a file as inputs; none for a file of another kind."""
     with Input(str(path)) as given:
         format, _ = detect(given.peek())
@@ -85,7 +88,7 @@ def _inputs_in(path: Path, kind: str, robots: int) -> list[bytes]:
             by_network: dict[int, list[ScriptItem]] = {}
             for item in _script(given, format):
                 by_network.setdefault(item.network, []).append(item)
-            return [data for sent in by_network.values() for data in inputs_of(kind, sent, robots)]
+            return [data for sent in by_network.values() for data in convert(sent)]
     if path.suffix.lower() in FOREIGN or not 0 < path.stat().st_size <= INPUT_BYTES:
         return []
     return [path.read_bytes()]

@@ -300,7 +300,7 @@ def _campaign(
     oracle = oracle_of(target, expected)
     inputs = dict.fromkeys(filter(None, target.seeds()))
     if options.corpus is not None:
-        taken, notes = read_corpus(options.corpus, spec.input, spec.robots)
+        taken, notes = read_corpus(options.corpus, target.inputs_of)
         inputs |= dict.fromkeys(taken)
         for note in notes:
             complain(note)

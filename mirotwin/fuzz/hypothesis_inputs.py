@@ -22,24 +22,38 @@ _LIMITS = (0, 1, -1, *(limit for field in VELOCITY for limit in (field.low, fiel
 _SPEEDS = sorted({*_LIMITS, *(sign * VELOCITY_SATURATION + by for sign in (1, -1) for by in (-1, 0, 1))})
 _PAIRS = [struct.pack("<hh", left, right) for left in _SPEEDS for right in _SPEEDS]
 _BYTES = [bytes([value]) for value in range(256)]
+_PUT = b"\x01"
 Bytes = st.SearchStrategy[bytes]
 
 
 def inputs(
-    kind: str, robots: int = 3, slot: int = 0, foreign: bool = False, seeds: Sequence[bytes] = ()
+    kind: str,
+    robots: int = 3,
+    slot: int = 0,
+    foreign: bool = False,
+    seeds: Sequence[bytes] = (),
+    puts: bool = False,
 ) -> Bytes:
     """Inputs of that kind ("bytes", "frames", "session") for robot `slot` of `robots`.
 
     `foreign`: frames are of somebody else's wire format: a count and so many bytes. `seeds`: half of the inputs begin
-    with one of them.
+    with one of them. `puts`: a session may put values of parts.
     """
-    drawn = {"bytes": _characters, "frames": _frames, "session": _session}[kind](robots, slot, foreign)
+    if kind == "session" and puts:
+        put = st.binary(min_size=3, max_size=3).map(lambda some: _PUT + some)
+        drawn = _joined(put | put | _session_operations(robots, slot, True))
+    else:
+        drawn = {"bytes": _characters, "frames": _frames, "session": _session}[kind](robots, slot, foreign)
     if not seeds:
         return drawn
     return drawn | st.tuples(st.sampled_from(seeds), drawn).map(b"".join)
 
 
 def _session(robots: int, slot: int, foreign: bool) -> Bytes:
+    return _joined(_session_operations(robots, slot, foreign))
+
+
+def _session_operations(robots: int, slot: int, foreign: bool) -> Bytes:
     """One strategy an operation, some more than one."""
     form = downlink(robots)
     places = st.integers(0, 256 * form.wire_size - 1).map(lambda both: bytes([both >> 8, both & 0xFF]))
@@ -55,7 +69,7 @@ def _session(robots: int, slot: int, foreign: bool) -> Bytes:
         _operation("stop bit", place),
         _operation("reset"),
     ]
-    return _joined(st.one_of(*operations))
+    return st.one_of(*operations)
 
 
 def _frame_operations(size: int, slot: int, foreign: bool) -> list[Bytes]:

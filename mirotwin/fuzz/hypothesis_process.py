@@ -80,7 +80,7 @@ def _round(run: Callable[[bytes], int], spec: TargetSpec, seeds: Sequence[bytes]
 
     from mirotwin.fuzz.hypothesis_inputs import inputs
 
-    drawn = inputs(spec.input, spec.robots, spec.slot, bool(spec.protocol), seeds)
+    drawn = inputs(spec.input, spec.robots, spec.slot, bool(spec.protocol), seeds, spec.board == "wired")
 
     @hypothesis.seed(seed)
     @hypothesis.settings(

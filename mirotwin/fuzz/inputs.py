@@ -64,10 +64,10 @@ def input_of(kind: str, items: Sequence[ScriptItem], robots: int) -> bytes:
                 data.append(RESET)
             continue
         if kind == "session":
-            data += _waited(item.tick - end_tick)
+            data += waited(item.tick - end_tick)
         for part in _parts(item, robots):
             if isinstance(part, bytes):
-                data += _raw(part) if kind == "session" else b""
+                data += raw(part) if kind == "session" else b""
                 continue
             seq = part[0] % SEQ_MODULUS
             step = (seq - last_seq) % SEQ_MODULUS
@@ -79,7 +79,7 @@ def input_of(kind: str, items: Sequence[ScriptItem], robots: int) -> bytes:
     return bytes(data)
 
 
-def _waited(ticks: int) -> bytes:
+def waited(ticks: int) -> bytes:
     """Operations that wait so long: silences, then a pause."""
     data = bytearray()
     while ticks >= _STEPS * PAUSE_TICKS:
@@ -106,7 +106,7 @@ def _parts(transmission: Transmission, robots: int) -> list[Frame | bytes]:
     return [*parts, *([rest] if rest else [])]
 
 
-def _raw(data: bytes) -> bytes:
+def raw(data: bytes) -> bytes:
     pieces = [data[first : first + _RAW_CHARACTERS] for first in range(0, len(data), _RAW_CHARACTERS)]
     return b"".join(bytes([RAW, len(piece) - 1]) + piece for piece in pieces)
 

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from abc import ABC, abstractmethod
+from collections.abc import Iterable
 from typing import Any
 
 import msgspec
@@ -20,7 +21,7 @@ from miro_robot.image import Image
 from miro_robot.mcs51.cpu import Cpu
 from miro_robot.plant import IdealWheels
 from miro_robot.wiring import load_wiring
-from mirotwin.fuzz.inputs import seeds
+from mirotwin.fuzz.inputs import inputs_of, seeds
 from mirotwin.fuzz.spec import MAP_SIZE, TargetSpec
 from mirotwin.shell.firmware_image import BOOT_PERIODS, is_up, load_firmware, not_up
 
@@ -76,6 +77,10 @@ class Target(ABC):
     @abstractmethod
     def seeds(self) -> list[bytes]:
         """Inputs to begin with."""
+
+    def inputs_of(self, happened: Iterable[ScriptItem]) -> list[bytes]:
+        """What was sent and done, as inputs that do the same."""
+        raise NotImplementedError
 
     def play(self, data: Any) -> int:
         """Puts the machine back and plays an input; how that ended, as of `Harness.play`."""
@@ -209,6 +214,9 @@ class RobotTarget(Target):
 
     def seeds(self) -> list[bytes]:
         return seeds(self.input, self.robots, self.slot)
+
+    def inputs_of(self, happened: Iterable[ScriptItem]) -> list[bytes]:
+        return inputs_of(self.input, happened, self.robots)
 
     def __repr__(self) -> str:
         return f"RobotTarget({self.image.path}, input={self.input!r}, robot {self.slot} of {self.robots})"

@@ -8,6 +8,7 @@ What a test may put, of any part, becomes 16 bits (`choice_of`), so that inputs 
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
+from contextlib import suppress
 from typing import Any
 
 import msgspec
@@ -48,17 +49,23 @@ class WiredMachine:
     """A board with its firmware up, as `Processor` is for a bare one. `script`: what brought it up; `choices`: what an
     input may put; `to_pc`: characters that the board has sent since the last `back`, with the tick of their stop bit.
 
-    `steps`: they bring it up, up to the last of them; without any, it is up when it sleeps, or when its receiver is on
-    and no branch was new for 300 ms. Raises BadInput for firmware that fails meanwhile, or takes more than `boot_ms`.
+    The first `count` of the `steps` bring it up. Without any it is up when it sleeps, or when its receiver is on and no
+    branch was new for 300 ms; or after `boot_ms`, if that is given. Raises BadInput for firmware that fails meanwhile.
     """
 
     NOT_STATE = ("*",)
 
     def __init__(
-        self, scenario: BoardScenario, image: Image, steps: Sequence[Step] = (), boot_ms: int = 0
+        self,
+        scenario: BoardScenario,
+        image: Image,
+        steps: Sequence[Step] = (),
+        count: int = 0,
+        boot_ms: int = 0,
     ) -> None:
+        self.steps = steps
         self.scenario = msgspec.structs.replace(scenario, stop_on_fault=True, step=())
-        run = Run.traced(RunSpec(scenario=self.scenario, image=image, steps=steps))
+        run = Run.traced(RunSpec(scenario=self.scenario, image=image, steps=steps[:count]))
         self.world = run.world
         device = self.world.devices[0]
         assert isinstance(device, BoardAlone)
@@ -66,7 +73,7 @@ class WiredMachine:
         self.board: EmptyBoard = device.board
         self.cpu = device.board.cpu
         self.image = image
-        if steps:
+        if count:
             self.how = _played(run)
         else:
             self.how = self._settled(boot_ms)
@@ -103,6 +110,16 @@ class WiredMachine:
     def _sent(self, value: int, tick: int, bits: int, bit_ticks: int) -> None:
         self.to_pc.append((value, tick))
 
+    def played(self) -> list[ScriptItem]:
+        """What all steps of the scenario send and do once the board is up, as far as they succeed."""
+        run = Run.traced(RunSpec(scenario=self.scenario, image=self.image, steps=self.steps))
+        if run.player is None or run.trace is None:
+            return []
+        with suppress(BadInput):
+            run.player.play()
+        _let_arrive(run.world)
+        return [item for item in run.trace.script() if item.tick >= self.begin_tick]
+
     # For the harness
 
     def run(self, tick: int) -> int:
@@ -133,6 +150,16 @@ class WiredMachine:
         """The same as an action of a stream."""
         path, value_of = self.choices[which]
         return Put(tick, 0, 0, path, value_of(value))
+
+    def bits_of(self, which: int, value: PutValue) -> int:
+        """The 16 bits that put `value`, or the next to it."""
+        value_of = self.choices[which][1]
+        for bits in range(0x10000):
+            if value_of(bits) == value:
+                return bits
+        if isinstance(value, str):
+            return 0
+        return min(range(0x10000), key=lambda bits: abs(float(value_of(bits)) - value))
 
     def fault(self) -> FirmwareFault | None:
         """The first one of the last run."""

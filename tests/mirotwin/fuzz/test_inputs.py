@@ -16,6 +16,10 @@ from mirotwin.fuzz.inputs import PAUSE_TICKS, SILENCE_TICKS, TOGETHER, input_of,
 NUMBERS = st.integers(-32767, 32767)
 
 
+def sessions(happened):
+    return inputs_of("session", happened, 3)
+
+
 @st.composite
 def messages(draw, robots=3):
     seq = draw(st.integers(0, 63))
@@ -124,7 +128,7 @@ def test_streams_become_inputs_and_files_of_a_fuzzer_are_taken_as_they_are(tmp_p
     (tmp_path / "queue").mkdir()
     (tmp_path / "queue" / "id:2").write_bytes(b"raw")
     (tmp_path / ".hidden").write_bytes(b"no")
-    inputs, notes = read_corpus(tmp_path, "session", 3)
+    inputs, notes = read_corpus(tmp_path, sessions)
     assert heard(SESSION, inputs[0])[0] == FRAME
     assert inputs[1:] == [b"\x06\x01", b"raw"]
     assert notes == []
@@ -132,7 +136,7 @@ def test_streams_become_inputs_and_files_of_a_fuzzer_are_taken_as_they_are(tmp_p
 
 def test_a_recording_becomes_inputs(tmp_path, finished):
     (tmp_path / "run.mcap").write_bytes((finished / "run.mcap").read_bytes())
-    inputs, _ = read_corpus(tmp_path, "session", 3)
+    inputs, _ = read_corpus(tmp_path, sessions)
     assert len(inputs) == 1
     assert heard(SESSION, inputs[0])[0].count(FRAME[:8]) >= 5
 
@@ -141,7 +145,7 @@ def test_foreign_files_are_passed_over_in_one_line(tmp_path):
     (tmp_path / "good").write_bytes(b"x")
     for name in ("a.png", "b.c", "c.json", "d.txt"):
         (tmp_path / name).write_bytes(b"something")
-    inputs, notes = read_corpus(tmp_path, "session", 3)
+    inputs, notes = read_corpus(tmp_path, sessions)
     assert inputs == [b"x"]
     assert notes == [f"--corpus {tmp_path}: passed over 4 files that are no inputs: a.png, b.c, c.json, .."]
 
@@ -149,7 +153,7 @@ def test_foreign_files_are_passed_over_in_one_line(tmp_path):
 def test_a_damaged_stream_is_named_with_its_line(tmp_path):
     (tmp_path / "good").write_bytes(b"x")
     (tmp_path / "bad.stream").write_text("# mirotwin stream 1\n12 > zz\n")
-    _, (note,) = read_corpus(tmp_path, "session", 3)
+    _, (note,) = read_corpus(tmp_path, sessions)
     assert note.startswith(f"--corpus: passed over: {tmp_path}/bad.stream:2:")
 
 
@@ -170,10 +174,10 @@ def test_a_folder_without_inputs_is_refused(tmp_path, files, said):
     for name, data in (files or {}).items():
         (folder / name).write_bytes(data)
     with pytest.raises(BadInput, match=said):
-        read_corpus(folder, "session", 3)
+        read_corpus(folder, sessions)
 
 
 def test_a_file_in_the_place_of_the_folder_is_refused(tmp_path):
     (tmp_path / "corpus").write_text("x")
     with pytest.raises(BadInput, match="is no folder"):
-        read_corpus(tmp_path / "corpus", "session", 3)
+        read_corpus(tmp_path / "corpus", sessions)

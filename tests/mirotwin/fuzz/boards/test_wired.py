@@ -20,7 +20,7 @@ BOARDS = Path(__file__).parents[4] / "examples" / "boards"
 def target_of(name, steps=1, image=None, **more):
     text = load_any(str(BOARDS / name))
     image = image or image_for(text)
-    machine = WiredMachine(text.scenario, image, steps_in(text)[:steps])
+    machine = WiredMachine(text.scenario, image, steps_in(text), steps)
     return BoardTarget(image, machine=machine, **more)
 
 
@@ -78,8 +78,8 @@ def test_without_steps_they_begin_when_the_firmware_has_settled():
 def test_what_can_be_put_follows_from_the_types_of_the_parts(car):
     choices = dict(car.machine.choices)
     assert list(choices) == [
-        *("eyes.distance_cm", "eyes.echo", "left.load_nm", "left.blocked", "right.load_nm", "right.blocked"),
-    ]  # fmt: skip
+        f"{name}.{key}" for name, keys in car.machine.device.parts.items() for key in keys.PUTS
+    ]
     distance = choices["eyes.distance_cm"]
     assert (distance(0), distance(0xFFFF)) == (2.0, 400.0)
     assert [choices["eyes.echo"](bits) for bits in range(4)] == ["high", "low", "none", "normal"]

@@ -13,7 +13,10 @@ def campaign(mirotwin, folder, source, *options):
     return mirotwin("fuzz", str(source), *common, *options)
 
 
-def test_a_board_and_its_image_are_fuzzed_and_the_case_of_a_fault_gives_it_again(mirotwin, engines, tmp_path):
+def test_a_board_and_its_image_are_fuzzed_and_the_case_of_a_fault_gives_it_again(
+    mirotwin, engines, tmp_path, monkeypatch
+):
+    monkeypatch.setattr("mirotwin.fuzz.fuzz_command.AFTER_S", 1.0)
     board_folder(tmp_path, program=HANGS)
     (tmp_path / "corpus").mkdir()
     (tmp_path / "corpus" / "first").write_bytes(b"\x09\x02a!b")
