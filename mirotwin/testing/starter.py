@@ -30,8 +30,8 @@ EXAMPLES = {
     "vscode": "The extension for VS Code: debugging firmware, backwards too.",
 }
 """Name, and what `mirotwin examples` says of it."""
-PROJECT = "hil"
-"""The folder that `mirotwin init` writes."""
+PROJECT, BOARDS = "hil", "boards"
+"""The folder that `mirotwin init` writes, and the one whose folders it writes with --board."""
 _DEBUG_FILES = {"mine": (".map", ".cdb", ".rst"), "late": (".map", ".cdb")}
 """The two images differ in one byte, a constant, so names and lines are the same; .rst holds the bytes, too."""
 
@@ -70,7 +70,7 @@ def _images() -> Iterator[tuple[str, Path]]:
 
 
 FIRMWARE = "firmware"
-REQUIREMENTS = "requirements.txt"
+REQUIREMENTS, README = "requirements.txt", "README.md"
 OF_FIRMWARE = "tests/test_firmware.py"
 """What only this firmware passes, because it names a function of it."""
 
@@ -85,6 +85,22 @@ def project_files(firmware: bool = True) -> Iterator[tuple[str, Path]]:
     if firmware:
         files += [(f"{FIRMWARE}/{path.relative_to(sources).as_posix()}", path) for path in all_files(sources)]
     yield from sorted(file for file in files if firmware or file[0] != OF_FIRMWARE)
+
+
+def board_files(board: str) -> Iterator[tuple[str, Path]]:
+    """(name in the project, file) of a project with a board of the examples, in the order of names.
+
+    Raises BadInput for a board that is not there.
+    """
+    boards, of_project = folder() / BOARDS, folder() / PROJECT
+    names = sorted(path.name for path in boards.iterdir() if path.is_dir())
+    if board not in names:
+        hint = did_you_mean(board, names) or f"there are {', '.join(names)}"
+        raise BadInput("", "--board", f"no such board {shortened(repr(board))}", hint)
+    files = [(path.relative_to(boards / board).as_posix(), path) for path in all_files(boards / board)]
+    of_any = [(path.relative_to(of_project).as_posix(), path) for path in all_files(of_project)]
+    files += [file for file in of_any if file[0].startswith((".git", REQUIREMENTS))]
+    yield from sorted([*files, (README, boards / README)])
 
 
 _LEFT_BEHIND = {"build", "runs", "__pycache__", ".pytest_cache", ".venv", "GNUmakefile"}
@@ -164,6 +180,14 @@ class InitOptions(Options, frozen=True, kw_only=True):
     without_firmware: Annotated[
         bool, Option(help="No C sources: the tests run on the robot's own firmware, or on an image of yours.")
     ] = False
+    board: Annotated[
+        str,
+        Option(
+            metavar="NAME",
+            help="Not the robot, but a board of the examples, such as car.",
+            apart="without_firmware",
+        ),
+    ] = ""
     source: Annotated[
         str,
         Option(
@@ -183,11 +207,15 @@ def init(options: InitOptions) -> None:
     runs them with `mirotwin conform` at each push. With --without-firmware the project tests a controller or
     a protocol and needs no C compiler. `make test IMAGE=mine.ihx` then tries an image of yours.
 
+    With --board car the project is an 8051 board of parts: board file, firmware in C and its image, scenarios, a pytest
+    test.
+
     requirements.txt says where the workflow gets Mirotwin: SOURCE, else the git commit, wheel or checkout that the
     installed one came from. Where neither is known, it says what to write there, and the workflow fails with that.
     """
     folder, remedy = options.folder, "name a folder that is new or empty"
-    files = {name: path.read_bytes() for name, path in project_files(not options.without_firmware)}
+    found = board_files(options.board) if options.board else project_files(not options.without_firmware)
+    files = {name: path.read_bytes() for name, path in found}
     line = origin.given(options.source, folder) if options.source else origin.installed(folder)
     if line is not None:
         text = files[REQUIREMENTS].decode()
@@ -202,6 +230,9 @@ def init(options: InitOptions) -> None:
             "That is a path of this machine. For CI on another one begin with --from git+https://HOST/PATH@COMMIT"
         )
     enter = shell_line("cd", operand(folder))
+    if options.board:
+        click.echo(f"next: {enter} && pytest   (make test builds the image first: needs SDCC and make)")
+        return
     if options.without_firmware:
         click.echo(f"next: {enter} && make test   (needs make and pytest)")
         return

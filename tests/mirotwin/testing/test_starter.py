@@ -81,7 +81,7 @@ def tree(folder):
     return {path.relative_to(folder).as_posix() for path in folder.rglob("*") if path.is_file()}
 
 
-COMMANDS = [("init",), *(("examples", name) for name in starter.EXAMPLES)]
+COMMANDS = [("init",), ("init", "--board", "car"), *(("examples", name) for name in starter.EXAMPLES)]
 of_each_command = pytest.mark.parametrize("words", COMMANDS, ids=lambda words: words[-1])
 
 
@@ -253,6 +253,53 @@ def test_a_project_without_firmware_passes_its_tests_without_a_c_compiler(mirotw
     assert done.returncode == 0, done.stdout + done.stderr
     assert (tmp_path / "mine/build/scenarios.xml").is_file()
     assert (tmp_path / "mine/build/pytest.xml").is_file() is ("pytest" in words)
+
+
+BOARDS = sorted(path.name for path in (starter.folder() / "boards").iterdir() if path.is_dir())
+
+
+@pytest.mark.parametrize("board", BOARDS)
+def test_a_project_of_a_board_passes_its_tests_with_pytest_alone(mirotwin, tmp_path, board):
+    out = mirotwin.succeeds("init", tmp_path / "mine", "--board", board)
+    found = tree(tmp_path / "mine")
+    done = children.run(
+        [sys.executable, "-m", "pytest", "-q", "-p", "no:hypothesispytest"],
+        cwd=tmp_path / "mine",
+        capture_output=True,
+        text=True,
+    )
+
+    assert found == {name for name, _ in starter.board_files(board)}
+    assert {
+        "Makefile",
+        "README.md",
+        "requirements.txt",
+        ".gitignore",
+        ".github/workflows/firmware.yml",
+    } <= found
+    assert f"next: cd {tmp_path}/mine && pytest" in out
+    scenarios = len(list((tmp_path / "mine").glob("*.scenario.toml")))
+    assert len(list((tmp_path / "mine").glob("test_*.py"))) == 1
+    assert done.returncode == 0, done.stdout + done.stderr
+    assert re.search(r"(\d+) passed in", done.stdout)[1] == f"{scenarios + 3 + (board == 'modbus')}"
+
+
+@pytest.mark.parametrize(
+    ("words", "line"),
+    [
+        (("--board", "cart"), "--board: no such board 'cart'; did you mean car?"),
+        (("--board", "x"), "--board: no such board 'x'; there are car, modbus, rover"),
+        (("--board", "../hil"), "--board: no such board '../hil'; there are car, modbus, rover"),
+    ],
+)
+def test_a_board_that_is_no_example_is_answered_with_those_there_are(mirotwin, tmp_path, words, line):
+    assert mirotwin.refuses("init", tmp_path / "mine", *words) == line
+    assert os.listdir(tmp_path) == []
+
+
+def test_a_board_has_its_own_firmware(mirotwin, tmp_path):
+    said = mirotwin.ends(2, "init", tmp_path / "mine", "--board", "car", "--without-firmware")
+    assert "--board does not go with --without-firmware" in said
 
 
 def requirements(folder):
