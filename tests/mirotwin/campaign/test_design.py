@@ -229,7 +229,13 @@ def fixed():
 
 
 @pytest.mark.parametrize(
-    ("name", "runs"), [("benchmarks/estimators.toml", 360), ("examples/campaign.toml", 240)]
+    ("name", "runs"),
+    [
+        ("benchmarks/estimators.toml", 360),
+        ("examples/campaign.toml", 240),
+        ("examples/boards/car/campaign.toml", 180),
+        ("examples/boards/follower/campaign.toml", 80),
+    ],
 )
 def test_the_campaign_files_of_the_tree_can_be_run(name, runs):
     assert load(ROOT / name).runs == runs

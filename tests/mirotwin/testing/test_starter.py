@@ -288,8 +288,8 @@ def test_a_project_of_a_board_passes_its_tests_with_pytest_alone(mirotwin, tmp_p
     ("words", "line"),
     [
         (("--board", "cart"), "--board: no such board 'cart'; did you mean car?"),
-        (("--board", "x"), "--board: no such board 'x'; there are car, modbus, rover"),
-        (("--board", "../hil"), "--board: no such board '../hil'; there are car, modbus, rover"),
+        (("--board", "x"), "--board: no such board 'x'; there are car, follower, modbus, rover"),
+        (("--board", "../hil"), "--board: no such board '../hil'; there are car, follower, modbus, rover"),
     ],
 )
 def test_a_board_that_is_no_example_is_answered_with_those_there_are(mirotwin, tmp_path, words, line):
