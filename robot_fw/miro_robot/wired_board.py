@@ -394,6 +394,8 @@ class WiredBoard(EmptyBoard):
                 part.supply(on, tick)
             except (Exception, SystemExit) as error:
                 place = f"part {part.name!r} ({part.keys.name}), tick {tick}: {'start' if on else 'supply'}"
+                if isinstance(error, PluginError):
+                    raise PluginError(f"{place}: {error.what}", error.remedy) from error
                 raise PluginError(f"{place}: {raised(error)}", "repair the part") from error
             nets.collect(self.part_index[part.name], tick)
         nets.settle(tick)

@@ -22,6 +22,5 @@ cdef class HcSr04OnCar(HcSr04Part):
     cdef object car, servo
     cdef public int sees_walls
 
-    cdef _peer(self, int pin, str method, str word, str remedy)
     @cython.locals(turned_deg=double, cm=double)
     cdef double _obstacle_cm(self, long long tick) except? -1

@@ -176,16 +176,14 @@ class HcSr04OnCar(HcSr04Part):
 
     def start(self, tick: int) -> None:
         if self.car is None:
-            self.car = self._peer(_BODY, "echo_cm", "car", 'give body = "CAR.body"')
+            self.car = self.source(_BODY)
+            if not hasattr(self.car, "echo_cm"):
+                raise PluginError("no car at pin body", 'give body = "CAR.body"')
             if _HORN in self.place.connected:
-                self.servo = self._peer(_HORN, "turned_deg", "servo", 'give horn = "SERVO.horn"')
+                self.servo = self.source(_HORN)
+                if not hasattr(self.servo, "turned_deg"):
+                    raise PluginError("no servo at pin horn", 'give horn = "SERVO.horn"')
         HcSr04Part.start(self, tick)
-
-    def _peer(self, pin: int, method: str, word: str, remedy: str) -> Any:
-        for part, _ in self.place.peers.get(pin, []):
-            if callable(getattr(part, method, None)):
-                return part
-        raise PluginError(f"part {self.name!r} (hc_sr04): no {word} at pin {self._named(pin)}", remedy)
 
     def _obstacle_cm(self, tick: int) -> float:
         if not self.sees_walls:

@@ -111,6 +111,13 @@ class Part:
             raise ValueError(f"has found a fault of kind {kind}, which does not exist")
         self.faults.append((order, kind, detail, ago))
 
+    def source(self, pin: int) -> Part | None:
+        """The part whose output is on the net of `pin`, as a motor's shaft; from `start` on."""
+        for part, number in self.place.peers.get(pin, []):
+            if part.keys.PINS[number].kind == STRONG:
+                return part
+        return None
+
     def _named(self, pin: int) -> str:
         return self.keys.PINS[pin].name if pin < len(self.keys.PINS) else str(pin)
 

@@ -170,15 +170,13 @@ class CarPart(OnShaft):
             self.top_cm_tick = max(self.top_cm_tick, 100.0 * self.radius_m * top_rad_tick)
 
     def _motor(self, pin: int) -> DcMotorPart | None:
-        name = self.keys.PINS[pin].name
-        for part, _ in self.place.peers.get(pin, []):
-            if isinstance(part, DcMotorPart):
-                return part
-        if pin in self.place.connected or not self.keys.PINS[pin].optional:
-            raise PluginError(
-                f"part {self.name!r} (car): no motor at pin {name}", f'give {name} = "MOTOR.shaft"'
-            )
-        return None
+        if pin not in self.place.connected and self.keys.PINS[pin].optional:
+            return None
+        motor = self.source(pin)
+        if not isinstance(motor, DcMotorPart):
+            name = self._named(pin)
+            raise PluginError(f"no motor at pin {name}", f'give {name} = "MOTOR.shaft"')
+        return motor
 
     # Motion
 

@@ -79,7 +79,7 @@ class DrivePart(Part):
         for part, _ in self.place.peers.get(pin, []):
             if isinstance(part, Lm629Part):
                 return part
-        what = f"part {self.name!r} ({self.keys.name}): no LM629 listens to pin {self.keys.PINS[pin].name}"
+        what = f"no LM629 listens to pin {self.keys.PINS[pin].name}"
         raise PluginError(what, "wire it to pin a of one")
 
     def start(self, tick: int) -> None:

@@ -74,12 +74,10 @@ class EncoderPart(OnShaft):
             self.due(tick)
 
     def _motor(self) -> DcMotorPart:
-        for part, _ in self.place.peers.get(_SHAFT, []):
-            if isinstance(part, DcMotorPart):
-                return part
-        raise PluginError(
-            f"part {self.name!r} (encoder): no motor at pin shaft", 'give shaft = "MOTOR.shaft"'
-        )
+        motor = self.source(_SHAFT)
+        if not isinstance(motor, DcMotorPart):
+            raise PluginError("no motor at pin shaft", 'give shaft = "MOTOR.shaft"')
+        return motor
 
     def due(self, tick: int) -> None:
         self.count = self._count_at(tick)

@@ -73,10 +73,6 @@ class LineSensorsPart(OnCar):
     def __init__(self, keys: LineSensors, place: Place) -> None:
         OnCar.__init__(self, keys, place)
         self.count = len(keys.places)
-        for pin in sorted(place.connected):
-            if pin > self.count:
-                what = f"part {place.name!r} (line_sensors): s{pin} is wired, and has no place"
-                raise PluginError(what, f"give {pin} places, or leave the pin out")
         self.ahead_cm, self.left_cm = [0.0] * 8, [0.0] * 8
         for number, (ahead_cm, left_cm) in enumerate(keys.places):
             self.ahead_cm[number], self.left_cm[number] = ahead_cm, left_cm
@@ -87,6 +83,9 @@ class LineSensorsPart(OnCar):
         self.held = [_SEEN] * 8
 
     def supply(self, on: int, tick: int) -> None:
+        last = max(self.place.connected)
+        if last > self.count:
+            raise PluginError(f"s{last} has no place", f"give {last} places, or leave the pin out")
         if self.car is None and _BODY in self.place.connected:
             self.car = self._car()
         self.is_on = on
@@ -94,10 +93,10 @@ class LineSensorsPart(OnCar):
         self.displaced(tick)
 
     def _car(self) -> CarPart:
-        for part, _ in self.place.peers.get(_BODY, []):
-            if isinstance(part, CarPart):
-                return part
-        raise PluginError(f"part {self.name!r} (line_sensors): no car at pin body", 'give body = "CAR.body"')
+        car = self.source(_BODY)
+        if not isinstance(car, CarPart):
+            raise PluginError("no car at pin body", 'give body = "CAR.body"')
+        return car
 
     def displaced(self, tick: int) -> None:
         if self.is_on:

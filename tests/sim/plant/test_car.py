@@ -1,14 +1,19 @@
 """How a car drives on a plane, and what stops it."""
 
 import math
+import tomllib
+from pathlib import Path
 
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from miro_exact.plugins import PluginError
+from miro_robot.build import board_of
 from miro_sim.plant.car import Car
 from miro_sim.plant.dc_motor import DcMotor
+from miro_sim.scenario.board_file import board_of_table
+from tests.robot.mcs51.asm import image_of
 from tests.robot.parts.bench import Bench
 from tests.sim.plant.car_bench import HZ, MS, WALLS, WAYS, bench, drive, pose
 
@@ -191,3 +196,36 @@ def test_its_way_does_not_depend_on_the_crystal():
         drive(board, "forward", "brake", crystal_hz)
         ends.append(pose(board))
     assert ends[0] == pytest.approx(ends[1], abs=0.02)
+
+
+BOARD = Path(__file__).parents[3] / "examples" / "boards" / "car" / "hall.board.toml"
+
+
+@pytest.mark.parametrize(
+    ("right", "wrong", "message"),
+    [
+        (
+            'left = "left.shaft"',
+            'left = "left.a"',
+            "'car' (car), tick 0: start: no motor at pin left; give left",
+        ),
+        (
+            'body = "car.body"',
+            'body = "left.shaft"',
+            "'eyes' (hc_sr04), tick 0: start: no car at pin body; give",
+        ),
+        (
+            'horn = "neck.horn"',
+            'horn = "car.body"',
+            "'eyes' (hc_sr04), tick 0: start: no servo at pin horn; give",
+        ),
+    ],
+)
+def test_a_board_that_is_wired_wrongly_says_so_in_one_line(right, wrong, message):
+    text = BOARD.read_text()
+    assert right in text
+    spec = board_of_table(tomllib.loads(text.replace(right, wrong)), "hall.board.toml")
+    with pytest.raises(PluginError) as refused:
+        board_of(spec, image_of("SJMP $"), 0)
+    assert message in f"{refused.value}"
+    assert "repair" not in f"{refused.value}"

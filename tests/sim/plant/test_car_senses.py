@@ -221,7 +221,7 @@ def test_without_supply_they_let_go_and_without_a_car_all_floor_is_light():
         ({"line": (LineSensors(), {"body": "x", "s1": "a", "s2": "b", "s3": "c"})}, "no car at pin body"),
         (
             {"line": (LineSensors(places=((8.0, 0.0),)), {"s1": "a", "s2": "b"})},
-            "s2 is wired, and has no place",
+            "s2 has no place",
         ),
         ({"eyes": (HcSr04(), {"trig": "t", "echo": "e", "body": "x"})}, "no car at pin body"),
     ],
