@@ -32,7 +32,7 @@ from mirotwin.fuzz.protocols import called, protocol_named, shown
 from mirotwin.fuzz.spec import TargetSpec
 from mirotwin.fuzz.target import NEVER_SLEEPS, Target, TargetFailure, described
 from mirotwin.fuzz.wired import WiredMachine
-from mirotwin.shell.firmware_image import load_firmware
+from mirotwin.shell.firmware_image import is_up, load_firmware
 from mirotwin.shell.part_files import bring_parts
 from mirotwin.verify.checks.expect import checks_of_table
 from mirotwin.verify.checks.interface import Check, Failure, Monitor, Subject, at, checked_monitor
@@ -48,6 +48,8 @@ MOST_PUT_SEEDS = 64
 PUT, WAIT = b"\x01", bytes([SILENCE, 19])
 _BITS = (b"\0\0", b"\x01\0", b"\xff\x7f", b"\xfe\xff", b"\xff\xff")
 """Of a put in a seed: the ends and the middle of a number, and four words."""
+UNHEARD_BAUD = 9600
+"""Of characters to firmware that does not listen: what parts say is all that it goes by."""
 _SEEN = ("received", "transmitted")
 _BY_TICK = attrgetter("tick")
 
@@ -80,6 +82,8 @@ class BoardTarget(Target):
         self.machine = machine or powered(image, crystal_hz, boot_ms)
         self.scenario = self.machine.scenario
         clock, bit_ticks = self.scenario.clock, 0 if baud else self.scenario.host_bit_ticks
+        if not bit_ticks and machine is not None and machine.choices and not is_up(machine.cpu):
+            baud = baud or UNHEARD_BAUD
         if not bit_ticks:
             bit_ticks = bit_ticks_of(self.machine, clock, baud, boot_ms)
         begin_tick = CYCLE_TICKS * self.machine.cpu.cycles

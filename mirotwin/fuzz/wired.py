@@ -105,7 +105,7 @@ class WiredMachine:
                 seen, new_tick = edges.count(0), world.tick
             elif is_up(cpu) and not boot_ms and world.tick - new_tick >= clock * SETTLED_MS // 1000:
                 return f"its receiver is on, and no branch was new for {SETTLED_MS} ms"
-        return f"after {boot_ms or BOOT_MS} ms"
+        return f"after {boot_ms or BOOT_MS} ms{'' if is_up(cpu) else ', its receiver is off'}"
 
     def _sent(self, value: int, tick: int, bits: int, bit_ticks: int) -> None:
         self.to_pc.append((value, tick))

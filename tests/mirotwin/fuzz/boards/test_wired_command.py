@@ -7,6 +7,15 @@ from tests.mirotwin.board_files import ECHO, board_folder
 HANGS = ECHO.replace("MOV SBUF,A\nJNB TI,$", "CJNE A,#21h,good\nLJMP 4000h\ngood:\nMOV SBUF,A\nJNB TI,$")
 """The same, but ! jumps to where no program is."""
 
+DEAF = """
+again:
+JB INT0,again
+wait:
+JNB INT0,wait
+LJMP 4000h
+"""
+"""Never turns its receiver on; jumps to where no program is when the key is let go."""
+
 
 def campaign(mirotwin, folder, source, *options):
     common = ("--time", "0.4s", "--minimise", "1s", "--out", str(folder / "out"))
@@ -33,6 +42,23 @@ def test_a_board_and_its_image_are_fuzzed_and_the_case_of_a_fault_gives_it_again
     assert (code, err.startswith("mirotwin: fails as recorded: no_fault")) == (3, True)
     assert mirotwin("test", str(case), "--firmware", image)[0] == 3
     assert mirotwin("replay", str(case), "--firmware", str(tmp_path / "inverted.hex"))[0] == 0
+
+
+def test_firmware_without_a_serial_port_is_fuzzed_by_what_its_parts_say(mirotwin, engines, tmp_path):
+    board_folder(tmp_path, program=DEAF)
+    (tmp_path / "corpus").mkdir()
+    (tmp_path / "corpus" / "press").write_bytes(b"\x01\x00\x01\x00\x0a\x40\x01\x00\x00\x00\x0a\x40")
+    options = (
+        "--firmware",
+        str(tmp_path / "lamp.hex"),
+        "--boot-ms",
+        "20",
+        "--corpus",
+        str(tmp_path / "corpus"),
+    )
+    code, _, err = campaign(mirotwin, tmp_path, tmp_path / "lamp.board.toml", *options)
+    assert "after 20 ms, its receiver is off; they put key.pressed" in err
+    assert code == 1, err
 
 
 @pytest.mark.parametrize(
