@@ -135,6 +135,9 @@ def conform(options: ConformOptions) -> int:
     every = EVERY_RULE if options.long or options.listing else RULES
     rules = list(dict.fromkeys(map(find, options.ids))) or list(every)
     junit, artifacts, quiet = options.junit, options.artifacts, options.quiet
+    if options.image is not None and options.image.endswith(".toml"):
+        reason = "is no image, and conform knows the rules of the robot's protocol alone"
+        raise BadInput(options.image, "", reason, "see docs/howto/own-protocol.md for rules of a board's")
     if options.listing:
         _list(rules, options.as_json)
         return DONE

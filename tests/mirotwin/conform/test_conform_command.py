@@ -138,6 +138,9 @@ REFUSED = {
     ("--rule", "P1"): "there is no rule 'P1'; did you mean P",
     ("--rule", "failsafe"): "there is no rule 'failsafe'; `mirotwin conform --list` shows P01 to",
     ("--explain", "P99"): "there is no rule 'P99'",
+    (
+        "car.board.toml",
+    ): "is no image, and conform knows the rules of the robot's protocol alone; see docs/howto/own-",
     ("none.ihx",): "none.ihx: there is no such file",
     ("--seed", "-1"): "-1 is not in the range",
     ("--junit", "nowhere/j.xml"): "nowhere",
