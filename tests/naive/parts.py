@@ -91,3 +91,23 @@ def edges_of(directions):
         for begin, end in pairwise(tick for tick in edges if directions[tick] == way)
     ]
     return edges, max(periods, default=(0, 0))
+
+
+def seen_segments(levels, window, digits):
+    """Seven-segment display, common cathode: the patterns that are seen after each whole window of ticks.
+
+    `levels`: at each tick the segments' byte and, by digit, the level of its pin, which is low for one that is on.
+    """
+    windows = [levels[first : first + window] for first in range(0, len(levels) - window + 1, window)]
+    shown = []
+    for ticks in windows:
+        times = [
+            [
+                sum(1 for segments, selects in ticks if segments >> bit & 1 and not selects[digit])
+                for bit in range(8)
+            ]
+            for digit in range(digits)
+        ]
+        least = max(1, max(max(row) for row in times) // 4, window // 256)
+        shown.append([sum(1 << bit for bit, time in enumerate(row) if time >= least) for row in times])
+    return shown

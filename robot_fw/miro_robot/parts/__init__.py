@@ -18,5 +18,6 @@ ELECTRONICS = {
     "pcf8591": "miro_robot.parts.pcf8591:Pcf8591",
     "relay": "miro_robot.parts.relay:Relay",
     "servo": "miro_robot.parts.servo:Servo",
+    "seven_segment": "miro_robot.parts.seven_segment:SevenSegment",
 }
 """Name to the struct of its keys. Parts that move are the physical world's."""

@@ -108,3 +108,51 @@ def test_a_program_reads_humidity_and_degrees(tmp_path, hz, part, options, shown
     bench.put("air.broken", "missing")
     bench.run(2500)
     assert bench.lines()[-1] == "silent"
+
+
+SHIFTED = """\
+[parts.segments]
+part = "hc595"
+pins = { ser = "P1.0", srclk = "P1.1", rclk = "P1.2", q7s = "link" }
+[parts.digits]
+part = "hc595"
+pins = { ser = "link", srclk = "P1.1", rclk = "P1.2" }
+[parts.clock]
+part = "seven_segment"
+[parts.clock.pins]
+"""
+SHIFTED += "".join(f'{pin} = "segments.q{bit}"\n' for bit, pin in enumerate([*"abcdefg", "dp"]))
+SHIFTED += "".join(f'dig{number + 1} = "digits.q{number}"\n' for number in range(4))
+PORTS = '[parts.clock]\npart = "seven_segment"\ncommon = "anode"\n[parts.clock.pins]\n'
+PORTS += "".join(f'{pin} = "P0.{bit}"\n' for bit, pin in enumerate([*"abcdefg", "dp"]))
+PORTS += "".join(f'dig{number + 1} = "!P2.{number}"\n' for number in range(4))
+
+
+@pytest.mark.parametrize(
+    ("parts", "options"), [(SHIFTED, ()), (PORTS, ("-DPORTS",))], ids=["shift registers", "port pins"]
+)
+def test_a_program_shows_a_clock(tmp_path, parts, options):
+    bench = Bench(tmp_path, "clock.c", parts, options=options)
+    bench.run(100)
+    assert bench.value("clock.text") == "12.34"
+    bench.run(1100)
+    assert (bench.value("clock.text"), bench.value("clock.digits")) == ("12.35", 4)
+    bench.run(25_000)
+    assert bench.value("clock.text") == "13.00"
+    if not options:
+        assert bench.value("digits.late_bits") == bench.value("segments.late_bits") == 0
+
+
+def test_a_program_switches_a_relay_above_a_voltage(tmp_path):
+    parts = '[parts.adc]\npart = "pcf8591"\npins = { scl = "P2.0", sda = "P2.1" }\n'
+    parts += '[parts.load]\npart = "relay"\npins = { coil = "P1.7", contact = "P1.6" }\n'
+    bench = Bench(tmp_path, "guard.c", parts)
+    bench.put("adc.ain0_v", 2.9)
+    bench.run(100)
+    assert (bench.value("load.closed"), bench.lines()) == (True, ["on"])
+    bench.put("adc.ain0_v", 3.1)
+    bench.run(30)
+    assert (bench.value("load.closed"), bench.lines()) == (False, ["off"])
+    bench.put("load.stuck", "closed")
+    bench.run(30)
+    assert bench.lines() == ["stuck"]
