@@ -2,6 +2,8 @@ cimport cython
 from miro_robot.mcs51.uart cimport Uart
 from miro_robot.processor_board cimport ProcessorBoard
 
+from miro_robot.mcs51.chip_registers cimport ChipRegisters
+
 cdef long long CYCLE_TICKS, NEVER_TICK, STOPPED_TICK, _CHECK_CYCLES
 cdef int _FLOATING, _MOVX_WITHOUT_STROBE
 cdef int ENDED, FAULT, REACHED, ASLEEP, BREAKPOINT, REPLAN, STOPPED, _EA, _SOURCES, _IE, _PAGE, _BYTES, _DATA_BITS, _ROLLOVERS, _OLD, _FRESH
@@ -23,7 +25,10 @@ cdef class EmptyBoard(ProcessorBoard):
     cdef bytearray ram, written
     cdef unsigned char[::1] memory, wrote
     cdef unsigned char touched[256]
+    cdef readonly ChipRegisters registers
+    cdef unsigned int lacking[256]
 
+    @cython.locals(registers=ChipRegisters, end_cycle='long long')
     cdef int _run(self, tuple addresses, long long until_tick) except -1
     cdef int _run_on(self, tuple marks, long long until_cycle) except -1
     cdef bint _may_wake(self) except -1
@@ -35,6 +40,10 @@ cdef class EmptyBoard(ProcessorBoard):
     cdef long long _silent_cycle(self) except -1
     cdef bint _interruptible(self) except -1
     cdef _begin_again(self)
+    @cython.locals(registers=ChipRegisters)
+    cdef int _registers_due(self) except -1
+    cdef int _watched(self) except -1
+    cpdef hold_reset(self, int level)
     @cython.locals(uart=Uart)
     cdef tuple _bits(self)
     cpdef bytes xram(self)

@@ -19,6 +19,7 @@ from miro_robot.board_spec import BoardSpec
 from miro_robot.event_log import ENDED, FAULT, REACHED
 from miro_robot.faults import STACK_FAULTS, FaultKind, FirmwareFault
 from miro_robot.image import Image
+from miro_robot.mcs51.chip_registers import ChipRegisters, registers_of
 from miro_robot.mcs51.chips import CHIPS
 from miro_robot.mcs51.cpu import ASLEEP, BREAKPOINT, REPLAN, STOPPED
 from miro_robot.mcs51.opcodes import jumps_to_itself, jumps_to_themselves
@@ -58,11 +59,13 @@ class EmptyBoard(ProcessorBoard):
         "ends": Items("q", _BYTES, 0, 0xFFFF),
         "pages": Octets(_PAGE * (1 + 2 * _PAGE)),
         "fresh_pages": Octets(_PAGE * (1 + 2 * _PAGE)),
+        "registers": ChipRegisters,
     }
-    NOT_HASHED = ("pages",)
+    NOT_HASHED = ("pages", "registers")
     NOT_STATE: tuple[str, ...] = (
         *("spec", "shared", "image", "loops", "stop_at", "stop_at_end"),
         *("sent", "listening", "input_tick", "forced", "again"),
+        "lacking",
         *("xram_end", "ram", "memory", "touched", "written", "wrote"),  # what `pages` are made of
     )  # fmt: skip
 
@@ -100,10 +103,12 @@ class EmptyBoard(ProcessorBoard):
         self.written = bytearray(_BYTES)  # with code_in_xram: 1 where the program has put code
         self.wrote = self.written
         self.touched = bytearray(_PAGE)
+        self.lacking = [0] * 256  # accesses to registers that the chip has not, by address
         self.load(image)
         chip = CHIPS[spec.chip]
         self.cpu.inner_xram = chip.xram_bytes if spec.xram == "internal" else 0
         self.cpu.peripherals.has_timer2 = int(chip.has_timer2)
+        self.registers = registers_of(spec.chip, self.cpu)
         self.cpu.pc = spec.start
 
     def load(self, image: Image) -> None:
@@ -127,8 +132,17 @@ class EmptyBoard(ProcessorBoard):
         until_cycle = (until_tick + CYCLE_TICKS - 1) // CYCLE_TICKS
         faults = self.fault_count
         marks = (*addresses, *self.stop_at) if self.stop_at else addresses
-        while cpu.cycles < until_cycle:
-            if self.dead:
+        registers = self.registers
+        end_cycle = until_cycle
+        while cpu.cycles < end_cycle:
+            if registers is not None:
+                if registers.due_cycle <= cpu.cycles:
+                    self._registers_due()
+                until_cycle = min(end_cycle, registers.due_cycle)
+            if registers is not None and registers.pause:
+                self._sleep_on(until_cycle)
+                reason = 0
+            elif self.dead:
                 if self._say_ended():
                     return STOPPED
                 cycle = until_cycle if self.ended else min(self._silent_cycle(), until_cycle)
@@ -142,7 +156,7 @@ class EmptyBoard(ProcessorBoard):
             if reason == BREAKPOINT:
                 self._pass_mark(addresses)
             elif reason == ASLEEP:
-                if cpu.powered_down or not self._may_wake() or not self._interruptible():
+                if cpu.powered_down or not ((self._may_wake() and self._interruptible()) or self._watched()):
                     self.dead = 1
                 else:
                     self._sleep_on(min(self.next_check, until_cycle))
@@ -180,7 +194,7 @@ class EmptyBoard(ProcessorBoard):
         self._step()
         if self.dead or address not in self.ends:
             return
-        if cpu.pc == address and not self._interruptible():
+        if cpu.pc == address and not self._interruptible() and not self._watched():
             self.dead = 1
         else:
             self.ends = tuple([end for end in self.ends if end != address])
@@ -230,6 +244,8 @@ class EmptyBoard(ProcessorBoard):
             self.cpu.reset()
         self.forced = 0
         self.held = level
+        if self.registers is not None:
+            self.registers.clear()
         self._begin_again()
 
     def set_power(self, on: int) -> None:
@@ -245,10 +261,36 @@ class EmptyBoard(ProcessorBoard):
             for address in range(256):
                 self.cpu.poke_iram(address, 0)
             self.pages = b""
+            if self.registers is not None:
+                self.registers.begin()
             if self.shared:
                 self._put_code()
         self.forced = 0
         self._begin_again()
+
+    def hold_reset(self, level: int) -> None:
+        """The chip holds itself in reset from now on (1), or lets go."""
+        self.forced = 1
+        if level:
+            self.cpu.hold()
+        else:
+            self.cpu.reset()
+        self.forced = 0
+        self._begin_again()
+
+    def _registers_due(self) -> None:
+        """What the chip's own registers want between two instructions: reset by the watchdog, and its end."""
+        registers = self.registers
+        if registers is not None and self.powered and not self.held:
+            wanted = registers.due()
+            if wanted:
+                self.hold_reset(wanted & 1)
+            if wanted & 1:
+                registers.hold()
+
+    def _watched(self) -> bool:
+        """Whether a watchdog will reset the processor."""
+        return self.registers is not None and self.registers.watches() != 0
 
     def _begin_again(self) -> None:
         self.dead = 0
@@ -282,6 +324,22 @@ class EmptyBoard(ProcessorBoard):
         if self.shared:
             self.wrote[address] = 1
             self.cpu.write_code(address, value)
+
+    def extra_read(self, address: int) -> int:
+        value = -1 if self.registers is None else self.registers.read(address)
+        if value >= 0:
+            return value
+        if not self.cpu.peripherals.observed:
+            self.lacking[address] += 1
+        return _FLOATING
+
+    def extra_write(self, address: int, value: int) -> None:
+        if self.registers is None or not self.registers.write(address, value):
+            self.lacking[address] += 1
+
+    def lacking_registers(self) -> dict[int, int]:
+        """Accesses by instructions to registers that the chip has not, by address."""
+        return {address: self.lacking[address] for address in range(256) if self.lacking[address]}
 
     def receiver_on(self, tick: int) -> None:
         if self.listening is not None and self.listening(tick):

@@ -366,6 +366,10 @@ class WiredBoard(EmptyBoard):
         EmptyBoard.set_reset(self, level)
         self._push(self.cpu.cycles * CYCLE_TICKS)
 
+    def hold_reset(self, level: int) -> None:
+        EmptyBoard.hold_reset(self, level)
+        self._push(self.cpu.cycles * CYCLE_TICKS)
+
     def set_power(self, on: int) -> None:
         """The parts lose their supply before the processor does, and have it after it."""
         if on == self.powered:

@@ -5,6 +5,8 @@ cdef class Bus:
     cpdef movx_without_strobe(self, int address, int write)
     cpdef int inner_read(self, int address) except -1
     cpdef inner_write(self, int address, int value)
+    cpdef int extra_read(self, int address) except -1
+    cpdef extra_write(self, int address, int value)
     cpdef fault(self, int kind, int pc, long long tick)
     cpdef receiver_on(self, long long tick)
     cpdef byte_received(self, int value, int stop, long long tick)

@@ -34,6 +34,13 @@ class Bus:
     def inner_write(self, address: int, value: int) -> None:
         """Stores into it."""
 
+    def extra_read(self, address: int) -> int:
+        """A register that the AT89C52 has not."""
+        return 0xFF
+
+    def extra_write(self, address: int, value: int) -> None:
+        """Writes it."""
+
     def xram(self) -> bytes:
         """All of the external RAM; empty where the board has none."""
         return b""

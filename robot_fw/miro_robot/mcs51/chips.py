@@ -1,7 +1,7 @@
 """The processors that a board may have: what of an AT89C52 they have, and what they add.
 
-All run with twelve periods of the crystal a machine cycle. Registers that one of them adds (watchdog, second data
-pointer, ISP and IAP, AUXR, P4) are not modelled: they read FFh, and writing them does nothing.
+All run with twelve periods of the crystal a machine cycle. Registers that one of them adds are in `chip_registers.py`;
+others read FFh, and writing them does nothing.
 """
 
 from __future__ import annotations

@@ -551,7 +551,10 @@ class Cpu(Chip):
 
     def sfr(self, address: int) -> int:
         """A special function register (80h..FFh; ports: their latch) as of now, without side effects."""
-        return self.register(address, self.cycles)
+        self.peripherals.observed = 1
+        value = self.register(address, self.cycles)
+        self.peripherals.observed = 0
+        return value
 
     def register(self, address: int, cycle: int) -> int:
         """A register, ports at their latches, with everything below `cycle` done."""

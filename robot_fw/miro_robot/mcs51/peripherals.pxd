@@ -11,7 +11,7 @@ from miro_robot.mcs51.uart cimport Uart
 cdef long long NEVER_TICK
 cdef long long _NO_PERIOD, STOPPED_TICK
 cdef int _P0, _TCON, _TMOD, _TL0, _TL1, _TH0, _TH1, _SCON, _SBUF, _IE, _IP
-cdef int _T2CON, _T2MOD, _RCAP2L, _RCAP2H, _TL2, _TH2, _RCLK, _TCLK, _UNIMPLEMENTED
+cdef int _T2CON, _T2MOD, _RCAP2L, _RCAP2H, _TL2, _TH2, _RCLK, _TCLK
 cdef int _S5P2, _SERIAL, _TIMER2, _BOTH_TIMERS, _REN, _SETTINGS, _RI_TI
 
 @cython.final
@@ -29,7 +29,7 @@ cdef class Peripherals:
     cdef public int frozen
     cdef int pulsed
     cdef public long long written
-    cdef public int has_timer2
+    cdef public int has_timer2, observed
     cdef readonly long long now
     cdef long long timer_wait, serial_wait, quiet
     cdef int timer1_free

@@ -27,7 +27,6 @@ from miro_robot.mcs51.timer2 import Timer2
 from miro_robot.mcs51.timers import Timers
 from miro_robot.mcs51.uart import STOPPED_TICK, Uart
 
-_UNIMPLEMENTED = 0xFF  # what an address without a register reads as (C5)
 _P0 = 0x80
 _TCON, _TMOD, _TL0, _TL1, _TH0, _TH1 = 0x88, 0x89, 0x8A, 0x8B, 0x8C, 0x8D
 _SCON, _SBUF, _IE, _IP = 0x98, 0x99, 0xA8, 0xB8
@@ -59,6 +58,7 @@ class Peripherals:
     NOT_STATE = (
         "bus",
         "has_timer2",
+        "observed",
         "written",
         "pulsed",
         "now",
@@ -87,6 +87,7 @@ class Peripherals:
         self.now = 0  # cycle below which everything has been done that can be noticed
         self.timer1_free = 0  # it clocks no direction of the serial port: writing timers does not touch that
         self.has_timer2 = 1
+        self.observed = 0  # 1 while a register is read by no instruction
         self.p3_reads = 0  # how often the pins of P3 were read: whether software listens on RXD itself
         self.look_again()
 
@@ -373,7 +374,7 @@ class Peripherals:
         if address == _TMOD:
             return self.timers.tmod
         if not self.has_timer2:
-            return _UNIMPLEMENTED
+            return self.bus.extra_read(address)
         if address == _T2CON:
             return self.timer2.control
         if address == _T2MOD:
@@ -384,7 +385,7 @@ class Peripherals:
             if not self.frozen:
                 self.timer2.sync(cycle)
             return (self.timer2.count >> (8 * (address - _TL2))) & 0xFF
-        return _UNIMPLEMENTED
+        return self.bus.extra_read(address)
 
     def write_bit(self, address: int, mask: int, level: int, cycle: int) -> int:
         """As `write`, of one bit; the others keep what hardware has set meanwhile."""
@@ -457,6 +458,8 @@ class Peripherals:
                 self.uart.write_sbuf(value)
         elif self.has_timer2:
             self._write_timer2(address, value, cycle)
+        else:
+            self.bus.extra_write(address, value)
 
     def _write_timer2(self, address: int, value: int, cycle: int) -> None:
         if address == _T2CON:
@@ -469,6 +472,8 @@ class Peripherals:
         elif address in (_TL2, _TH2):
             shift = 8 * (address - _TL2)
             self.timer2.count = self.timer2.count & 0xFF00 >> shift | value << shift
+        else:
+            self.bus.extra_write(address, value)
 
     def bit_ticks(self) -> int:
         """Length of a bit that the receiver expects, 0 while it is off or its clock does not run regularly yet."""
