@@ -1,5 +1,6 @@
 /* A line follower. The button starts and stops it; a press counts when it has lasted 20 ms. The display shows what it
- * does, what the sensors see (# dark), and how fast the wheels are to go.
+ * does, what the sensors see (# dark), how fast the wheels are to go, and how far the left one has rolled: timer 1 counts
+ * the slots of its disc.
  *
  * The bridge has no enables: PWM is on the input that drives a wheel the wanted way, with the other input low; in the
  * rest of a period both are low, and the motor brakes. Timer 0 makes 20 steps of 500 machine cycles: 100 Hz at 12 MHz.
@@ -23,7 +24,7 @@
 #define LOST_PERIODS 60   /* without a line for so long it stops */
 #define FAST 14
 #define SLOW 7
-#define BACK (-6)
+#define SLOWEST 3
 
 #define LEFT_DARK 1
 #define MIDDLE_DARK 2
@@ -87,6 +88,22 @@ static void show_speed(unsigned char place, signed char speed)
     write('0' + speed % 10, 1);
 }
 
+static void show_way(unsigned char place)
+{
+    unsigned char high, low;
+    unsigned int cm, unit = 1000;
+    do { /* the low half may overflow between the two reads */
+        high = TH1;
+        low = TL1;
+    } while (high != TH1);
+    cm = (unsigned int)high << 8 | low;
+    cm += cm / 50; /* a slot is 1.02 cm */
+    write(0x80 | place, 0);
+    for (; unit; unit /= 10)
+        write('0' + cm / unit % 10, 1);
+    show(place + 4, " cm");
+}
+
 static void pause(unsigned char count)
 {
     unsigned char begun = periods;
@@ -129,13 +146,13 @@ static void follow(unsigned char seen)
         last = seen;
     switch (last) {
     case LEFT_DARK:
-        go(BACK, FAST);
+        go(SLOWEST, FAST);
         break;
     case LEFT_DARK | MIDDLE_DARK:
         go(SLOW, FAST);
         break;
     case RIGHT_DARK:
-        go(FAST, BACK);
+        go(FAST, SLOWEST);
         break;
     case RIGHT_DARK | MIDDLE_DARK:
         go(FAST, SLOW);
@@ -166,7 +183,8 @@ void main(void)
     static unsigned char seen, lost_since = 0, shown = 0;
     __bit going = 0;
     P1 = 0xF0;
-    TMOD = 0x01;
+    TMOD = 0x51; /* timer 1: 16 bits, counts falling edges of T1; timer 0: 16 bits */
+    TR1 = 1;
     TR0 = 1;
     ET0 = 1;
     EA = 1;
@@ -197,6 +215,7 @@ void main(void)
             write(seen & RIGHT_DARK ? '#' : '-', 1);
             show_speed(0x40, left);
             show_speed(0x44, right);
+            show_way(0x49);
         }
     }
 }

@@ -5,7 +5,7 @@ from miro_sim.plant.chassis cimport Body
 from miro_sim.plant.dc_motor cimport DcMotorPart, OnShaft
 from miro_sim.plant.plane cimport Plane
 
-cdef double _TURN_RAD, _DEGREE_RAD, _NO_NEARER_CM
+cdef double _TURN_RAD, _DEGREE_RAD, _NO_NEARER_CM, _MOST_RAD
 cdef int _BODY
 
 cdef class OnCar(Part):

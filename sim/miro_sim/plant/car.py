@@ -35,6 +35,7 @@ from miro_sim.plant.plane import MOST_SEGMENTS, Plane
 _TURN_RAD = 6.283185307179586
 _DEGREE_RAD = 0.017453292519943295
 _NO_NEARER_CM = 1e-9
+_MOST_RAD = 1e5  # of a heading that counts whole turns: two hours of a car that spins
 _LEFT, _RIGHT, _REAR_LEFT, _REAR_RIGHT, _BODY = range(5)
 
 Cm = Annotated[float, Meta(ge=-1e4, le=1e4)]
@@ -58,7 +59,7 @@ class Car(PartKeys, frozen=True, kw_only=True, tag="car"):
     READS = {
         "x_cm": "where it is",
         "y_cm": "where it is",
-        "heading_deg": "where it looks, counter-clockwise from x, not wrapped",
+        "heading_deg": "where it looks, counter-clockwise from x; whole turns count",
         "speed_cm_s": "forward; 0 at a wall",
         "bumped": "whether a wall stops it",
         "bumps": "how often it came to one",
@@ -186,6 +187,8 @@ class CarPart(OnShaft):
             return
         left, right = self.left_turns, self.right_turns
         bumped = self._roll(tick)
+        if not -_MOST_RAD < self.body.theta_rad < _MOST_RAD:
+            self.body.theta_rad = dmath.wrap_pi(self.body.theta_rad)
         if left != self.left_turns or right != self.right_turns:
             self.bumps += 1 if bumped and not self.bumped else 0
             self.bumped = bumped

@@ -162,6 +162,18 @@ def test_a_test_puts_it_elsewhere():
     assert y > 10
 
 
+def test_a_car_that_spins_for_hours_still_knows_where_it_looks():
+    keys = Car(track_cm=0.1, wheel_radius_cm=100.0, mass_kg=1e-3)
+    board = bench(keys)
+    headings = []
+    while not headings or headings[-1] >= max(headings):
+        drive(board, "backward", "forward", 100 * MS)
+        headings.append(pose(board)[2])
+    assert max(headings) > 5e6
+    assert -180 < headings[-1] < 1e6
+    bench(keys).load(board.save())
+
+
 def test_without_the_supply_of_its_bridge_it_rolls_out():
     board = bench(Car())
     drive(board, "forward", "forward", 800 * MS)
