@@ -221,6 +221,14 @@ def test_a_board_is_called_as_its_file_or_as_it_says(tmp_path):
         ),
         (HEAD + "[straps]\nmode = { pin = 'P1.0', level = 2 }", "straps.mode.level: is out of range; must be <= 1"),
         (HEAD + "[nets]\nA = 'P7.0'", "nets.A: 'P7.0' is no port pin; give a port pin, as P1.0"),
+        (
+            HEAD + "[parts.t]\npart = 'ds18b20'\npins = { dq = 'P1.0' }\nserial = '12'",
+            "parts.t: serial is '12', not 12 hex digits",
+        ),
+        (
+            HEAD + "[parts.m]\npart = 'at24c'\npins = { scl = 'P1.0', sda = 'P1.1' }\ncontent = '0x12'",
+            "parts.m.content: '0x12' is not bytes in hex digits; use two digits a byte, as 0a ff",
+        ),
         (HEAD + "[straps]\n'slot.0' = { pin = 'P1.0' }", "straps.slot.0: 'slot.0' is not a name; use letters"),
         (HEAD + "[straps]\na = { pin = 'P1.0' }\nb = { pin = 'P1.0' }", "straps.b.pin: strap a is on P1.0, too"),
         (HEAD + "x = nan", "x: nan is not a number that can be used; give a finite number"),

@@ -62,7 +62,7 @@ class Dht11(PartKeys, frozen=True, kw_only=True, tag="dht11"):
 
 
 class Dht22(Dht11, frozen=True, kw_only=True, tag="dht22"):
-    """Tenths of degrees and percent, below zero, too; for the rest see dht11."""
+    """A DHT22 (AM2302): a DHT11 that tells tenths of degrees and percent, below zero, too. Else see dht11."""
 
     PUTS: ClassVar[dict[str, Any]] = {
         **Dht11.PUTS,

@@ -63,13 +63,25 @@ class Ds18b20(PartKeys, frozen=True, kw_only=True, tag="ds18b20"):
         "1-Wire signaling, AC electrical characteristics"
     )
 
-    serial: Annotated[str, Meta(pattern=r"^([0-9A-Fa-f]{12})?$")] = ""
+    serial: str = ""
     slot_us: Annotated[float, Meta(ge=15.0, le=60.0)] = 30.0
     power: Literal["vdd", "parasite"] = "vdd"
-    eeprom: Annotated[str, Meta(pattern=r"^[0-9A-Fa-f]{6}$")] = "4b467f"
+    eeprom: str = "4b467f"
+
+    def __post_init__(self) -> None:
+        _bytes_of(self.serial or "000000000000", 6, "serial")
+        _bytes_of(self.eeprom, 3, "eeprom")
 
     def make(self, place: Place) -> Part:
         return Ds18b20Part(self, place)
+
+
+def _bytes_of(text: str, count: int, key: str) -> bytes:
+    """Raises ValueError for anything but so many bytes in hex digits."""
+    digits = text.strip().lower()
+    if len(digits) != 2 * count or digits.strip("0123456789abcdef"):
+        raise ValueError(f"{key} is {text!r}, not {2 * count} hex digits")
+    return bytes.fromhex(digits)
 
 
 def crc8(values: list[int]) -> int:
@@ -110,8 +122,8 @@ class Ds18b20Part(Part):
 
     def __init__(self, keys: Ds18b20, place: Place) -> None:
         Part.__init__(self, keys, place)
-        serial = bytes.fromhex(keys.serial) or place.name.encode().rjust(6, b"\0")
-        rom = [_FAMILY, *serial[len(serial) - 6 :]]
+        name = place.name.encode().rjust(6, b"\0")
+        rom = [_FAMILY, *(bytes.fromhex(keys.serial) or name[len(name) - 6 :])]
         self.rom = [*rom, crc8(rom)]
         self.is_parasite = 1 if keys.power == "parasite" else 0
         self.reset_ticks = -(-_RESET_US * self.crystal_hz // 1_000_000)  # rounded up

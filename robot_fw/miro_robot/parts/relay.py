@@ -24,7 +24,9 @@ _STUCK = ("none", "open", "closed")
 
 
 class Relay(Button, frozen=True, kw_only=True, tag="relay"):
-    """A relay. `active`: the level of `coil` that pulls it in. `operate_ms`, `release_ms`: what the sheet has at most.
+    """A relay with its driver: a coil that a pin switches, and a contact that follows some milliseconds later.
+
+    `active`: the level of `coil` that pulls it in. `operate_ms`, `release_ms`: what the sheet has at most.
 
     `to`: where the contact leads. `rest`: what it is without current. `bounce_ms`: as of a button, after each move.
     A coil that is switched back before the armature has moved moves nothing. Without supply the coil has no current.

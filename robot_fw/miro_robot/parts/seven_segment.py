@@ -63,14 +63,14 @@ _GLYPHS = {
 
 
 class SevenSegment(PartKeys, frozen=True, kw_only=True, tag="seven_segment"):
-    """Digits, as many as have a pin; without one it is a single digit that is always on.
+    """Digits, as many as have a pin; without one it is a single digit that is always on. What has no pin is dark.
 
     `common`: what the segments of a digit share. `window_ms`: for so long an eye gathers light.
     """
 
     PINS = (
         *(Pin(name) for name in "abcdefg"),
-        Pin("dp", IN, optional=True),
+        Pin("dp", IN, optional=True, level=0),
         *(Pin(f"dig{number}", IN, optional=True) for number in range(1, _MOST_DIGITS + 1)),
     )
     READS = {

@@ -106,6 +106,8 @@ def explained(what: str, path: str, value: Any, remedy: str) -> tuple[str, str]:
         return f"{value} is out of range", f"must be {limit[1]} {limit[2]}{_unit_of(path)}"
     if what.startswith(("Invalid enum value", "Invalid value")):
         return f"{value!r} is not one of the choices", remedy
+    if "0-9A-Fa-f" in what:
+        return f"{value!r} is not bytes in hex digits", "use two digits a byte, as 0a ff"
     if "matching regex" in what:
         return f"{value!r} is not a name", "use a-z, 0-9, - and _, at most 64 characters"
     return what[:1].lower() + what[1:], remedy

@@ -8,6 +8,7 @@ from miro_robot.build import board_of
 from miro_robot.image import load_hex
 from miro_sim.scenario.board_file import load_board
 from tests.robot.inspect.programs import build
+from tests.states import restore, snapshot
 
 FOLDER = Path(__file__).parent / "firmware"
 CRYSTALS = pytest.mark.parametrize("hz", [11_059_200, 12_000_000])
@@ -17,12 +18,16 @@ class Bench:
     """A board around a program; `lines` are what it has sent since the last look."""
 
     def __init__(self, folder, program, parts, hz=11_059_200, options=()):
-        image = load_hex(build(folder, (FOLDER / program).read_text("utf-8"), *options))
-        file = folder / "a.board.toml"
-        file.write_text(f'chip = "at89c52"\ncrystal_hz = {hz}\n{parts}')
-        self.board = board_of(load_board(str(file)), image)
+        self.image = load_hex(build(folder, (FOLDER / program).read_text("utf-8"), *options))
+        self.file = folder / "a.board.toml"
+        self.file.write_text(f'chip = "at89c52"\ncrystal_hz = {hz}\n{parts}')
+        self.board = self.fresh()
         self.hz, self.tick, self.sent = hz, 0, bytearray()
         self.board.sent = lambda value, *_: self.sent.append(value)
+
+    def fresh(self):
+        """Another board like this one, at its begin."""
+        return board_of(load_board(str(self.file)), self.image)
 
     def run(self, ms):
         self.tick += ms * self.hz // 1000
@@ -41,9 +46,14 @@ class Bench:
         return lines
 
 
+PROBE = '[parts.probe]\npart = "ds18b20"\npins = { dq = "P3.7" }\n'
+AIR = '[parts.air]\npart = "dht11"\npins = { data = "P1.3" }\n'
+ADC = '[parts.adc]\npart = "pcf8591"\npins = { scl = "P2.0", sda = "P2.1" }\n'
+
+
 @CRYSTALS
 def test_a_program_reads_a_thermometer(tmp_path, hz):
-    bench = Bench(tmp_path, "ds18b20.c", '[parts.probe]\npart = "ds18b20"\npins = { dq = "P3.7" }\n', hz)
+    bench = Bench(tmp_path, "ds18b20.c", PROBE, hz)
     bench.put("probe.temperature_c", 21.5)
     bench.run(800)
     assert bench.lines() == ["21.5"]
@@ -63,8 +73,7 @@ def test_a_program_reads_a_thermometer(tmp_path, hz):
 
 @pytest.mark.parametrize("slot_us", [15, 60])
 def test_it_does_so_from_the_fastest_chip_and_from_the_slowest(tmp_path, slot_us):
-    part = f'[parts.probe]\npart = "ds18b20"\npins = {{ dq = "P3.7" }}\nslot_us = {slot_us}\n'
-    bench = Bench(tmp_path, "ds18b20.c", part)
+    bench = Bench(tmp_path, "ds18b20.c", f"{PROBE}slot_us = {slot_us}\n")
     bench.put("probe.temperature_c", 99.9)
     bench.run(800)
     assert bench.lines() == ["99.9"]
@@ -72,8 +81,7 @@ def test_it_does_so_from_the_fastest_chip_and_from_the_slowest(tmp_path, slot_us
 
 @CRYSTALS
 def test_a_program_reads_voltages_and_puts_one_out(tmp_path, hz):
-    part = '[parts.adc]\npart = "pcf8591"\npins = { scl = "P2.0", sda = "P2.1" }\n'
-    bench = Bench(tmp_path, "pcf8591.c", part, hz)
+    bench = Bench(tmp_path, "pcf8591.c", ADC, hz)
     for number, volts in enumerate((1.25, 0.0, 5.0, 3.3)):
         bench.put(f"adc.ain{number}_v", volts)
     bench.run(60)
@@ -144,8 +152,7 @@ def test_a_program_shows_a_clock(tmp_path, parts, options):
 
 
 def test_a_program_switches_a_relay_above_a_voltage(tmp_path):
-    parts = '[parts.adc]\npart = "pcf8591"\npins = { scl = "P2.0", sda = "P2.1" }\n'
-    parts += '[parts.load]\npart = "relay"\npins = { coil = "P1.7", contact = "P1.6" }\n'
+    parts = ADC + '[parts.load]\npart = "relay"\npins = { coil = "P1.7", contact = "P1.6" }\n'
     bench = Bench(tmp_path, "guard.c", parts)
     bench.put("adc.ain0_v", 2.9)
     bench.run(100)
@@ -156,3 +163,25 @@ def test_a_program_switches_a_relay_above_a_voltage(tmp_path):
     bench.put("load.stuck", "closed")
     bench.run(30)
     assert bench.lines() == ["stuck"]
+
+
+@pytest.mark.parametrize(
+    ("program", "parts", "begin_ms"),
+    [("ds18b20.c", PROBE, 0), ("dht.c", AIR, 1166), ("pcf8591.c", ADC, 0), ("clock.c", SHIFTED, 68)],
+)
+def test_a_board_that_is_saved_anywhere_goes_on_the_same(tmp_path, program, parts, begin_ms):
+    bench = Bench(tmp_path, program, parts)
+    bench.run(begin_ms)
+    cut, whole = bench.fresh(), bench.board
+    restore(cut, snapshot(whole))
+    seen = set()
+    for tick in range(bench.tick, bench.tick + 150_000, 1_237):
+        cut.run(tick)
+        state = snapshot(cut)
+        seen.add(state)
+        cut = bench.fresh()
+        restore(cut, state)
+        assert snapshot(cut) == state
+    whole.run(tick)
+    assert snapshot(whole) == snapshot(cut)
+    assert len(seen) > 100
