@@ -12,7 +12,7 @@ from typing import Any
 
 from msgspec.structs import replace
 
-from miro_exact.bad_input import BadInput
+from miro_exact.bad_input import BadInput, amount
 from miro_exact.clock import CHARACTER_BITS, CYCLE_TICKS
 from miro_exact.raised import raised
 from miro_protocol.actions import Put, Reset, ScriptItem
@@ -45,7 +45,7 @@ NO_FAULT_CODE, NEVER_SLEEPS_CODE, CHECK_CODE = 1, 2, 3
 MOST_OF_A_BODY = 32
 """Bytes of a body in a seed; the harness's program has a form for longer ones, which a fuzzer triage."""
 MOST_PUT_SEEDS = 64
-PUT, WAIT = b"\x01", bytes([SILENCE, 19])
+PUT, PIN, WAIT = b"\x01", b"\x04", bytes([SILENCE, 19])
 _BITS = (b"\0\0", b"\x01\0", b"\xff\x7f", b"\xfe\xff", b"\xff\xff")
 """Of a put in a seed: the ends and the middle of a number, and four words."""
 UNHEARD_BAUD = 9600
@@ -100,7 +100,8 @@ class BoardTarget(Target):
             INPUTS.index(input),
             repair=lambda body: self._repaired(body, self.program.frames),
             character_ticks=CHARACTER_BITS * bit_ticks,
-            choices=0 if machine is None else len(machine.choices),
+            choices=0 if machine is None else machine.values,
+            pins=0 if machine is None else len(machine.choices) - machine.values,
         )
         super().__init__(image, harness, program)
         self.code = 0
@@ -255,7 +256,8 @@ class BoardTarget(Target):
                 data.append(RESET)
             elif isinstance(item, Put) and self.wired is not None:
                 which = [path for path, _ in self.wired.choices].index(item.path)
-                data += PUT + bytes([which]) + self.wired.bits_of(which, item.value).to_bytes(2, "little")
+                op, number = (PUT, which) if which < self.wired.values else (PIN, which - self.wired.values)
+                data += op + bytes([number]) + self.wired.bits_of(which, item.value).to_bytes(2, "little")
         return [bytes(data)] if data else []
 
     def _operations(self, characters: bytes) -> bytes:
@@ -279,8 +281,12 @@ class BoardTarget(Target):
         if self.wired is None:
             return ""
         begin_tick, clock = self.harness.begin_tick, self.scenario.clock
-        values = ", ".join(path for path, _ in self.wired.choices) or "no values"
-        return f"inputs begin at {at(begin_tick, clock)}: {self.wired.how}; they put {values}"
+        values, pins = self.wired.values, len(self.wired.choices) - self.wired.values
+        named = [path for path, _ in self.wired.choices[:values]]
+        if pins:
+            named.append(amount(pins, "pin that nothing drives", "pins that nothing drives"))
+        puts = ", ".join(named)
+        return f"inputs begin at {at(begin_tick, clock)}: {self.wired.how}; they put {puts or 'nothing'}"
 
     def __repr__(self) -> str:
         return f"BoardTarget({self.image.path}, input={self.input!r}, {self.scenario})"

@@ -22,7 +22,7 @@ _LIMITS = (0, 1, -1, *(limit for field in VELOCITY for limit in (field.low, fiel
 _SPEEDS = sorted({*_LIMITS, *(sign * VELOCITY_SATURATION + by for sign in (1, -1) for by in (-1, 0, 1))})
 _PAIRS = [struct.pack("<hh", left, right) for left in _SPEEDS for right in _SPEEDS]
 _BYTES = [bytes([value]) for value in range(256)]
-_PUT = b"\x01"
+_PUT, _PIN = b"\x01", b"\x04"
 Bytes = st.SearchStrategy[bytes]
 
 
@@ -37,11 +37,11 @@ def inputs(
     """Inputs of that kind ("bytes", "frames", "session") for robot `slot` of `robots`.
 
     `foreign`: frames are of somebody else's wire format: a count and so many bytes. `seeds`: half of the inputs begin
-    with one of them. `puts`: a session may put values of parts.
+    with one of them. `puts`: a session may put values of parts and levels on pins.
     """
     if kind == "session" and puts:
-        put = st.binary(min_size=3, max_size=3).map(lambda some: _PUT + some)
-        drawn = _joined(put | put | _session_operations(robots, slot, True))
+        put, pin = (st.binary(min_size=3, max_size=3).map(code.__add__) for code in (_PUT, _PIN))
+        drawn = _joined(put | put | pin | _session_operations(robots, slot, True))
     else:
         drawn = {"bytes": _characters, "frames": _frames, "session": _session}[kind](robots, slot, foreign)
     if not seeds:

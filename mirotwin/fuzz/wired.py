@@ -46,8 +46,9 @@ Choice = tuple[str, Callable[[int], PutValue]]
 
 
 class WiredMachine:
-    """A board with its firmware up, as `Processor` is for a bare one. `script`: what brought it up; `choices`: what an
-    input may put; `to_pc`: characters that the board has sent since the last `back`, with the tick of their stop bit.
+    """A board with its firmware up, as `Processor` is for a bare one. `script`: what brought it up. `choices`: what an
+    input may put, the first `values` of them values of parts, then pins. `to_pc`: characters that the board has sent
+    since the last `back`, with the tick of their stop bit.
 
     The first `count` of the `steps` bring it up. Without any it is up when it sleeps, or when its receiver is on and no
     branch was new for 300 ms; or after `boot_ms`, if that is given. Raises BadInput for firmware that fails meanwhile.
@@ -83,7 +84,10 @@ class WiredMachine:
         assert run.trace is not None
         self.script: Sequence[ScriptItem] = run.trace.script()
         self.begin_tick = self.cpu.cycles * CYCLE_TICKS
-        self.choices = choices_of(device.parts)
+        values = choices_of(device.parts)
+        self.values = len(values)
+        pins = self.board.nets.netlist.free_pins() if isinstance(self.board, WiredBoard) else []
+        self.choices = [*values, *((pin, _level) for pin in pins)]
         self.to_pc: list[tuple[int, int]] = []
         self.reset_tick = -1
         self.oracle = WiredOracle(self)
@@ -277,6 +281,10 @@ def choice_of(info: Any) -> Callable[[int], PutValue] | None:
     if isinstance(info, kind.StrType):
         return lambda bits: bits.to_bytes(2, "little").hex()
     return None
+
+
+def _level(bits: int) -> PutValue:
+    return bits & 1
 
 
 def _number(info: Any) -> Callable[[int], PutValue]:

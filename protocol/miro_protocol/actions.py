@@ -47,7 +47,7 @@ class RadioState(msgspec.Struct, frozen=True):
 
 
 class PinLevel(msgspec.Struct, frozen=True):
-    """`TICK * P1.0 0|1`: the level that is put on a port pin of a board alone."""
+    """`TICK * P1.0 0|1`: the level that is put on a port pin of a board alone; the same as `TICK * P1.0 = 0`."""
 
     tick: int
     pin: str
@@ -109,6 +109,12 @@ Action = Reset | Power | RadioState | Put
 """What somebody does to a robot, a radio or a part in a world."""
 ScriptItem = Transmission | Action
 """What goes into a world from outside."""
+
+
+def put_on_pin(item: ScriptItem | PinLevel) -> ScriptItem:
+    """A level on a pin as the put that it is, on a board with parts."""
+    return Put(item.tick, 0, 0, item.pin, item.level) if isinstance(item, PinLevel) else item
+
 
 WHO_CAN = {
     Reset: "`mirotwin replay` resets robots",

@@ -23,7 +23,7 @@ import msgspec
 
 from miro_exact.inputs import read_input, replace_file
 from miro_protocol import stream_header
-from miro_protocol.actions import WHO_CAN, Action, ScriptItem
+from miro_protocol.actions import WHO_CAN, ScriptItem, put_on_pin
 from miro_protocol.stream_header import PREFIX, Header
 from miro_protocol.stream_line import (
     FIRST_LINE,
@@ -55,11 +55,8 @@ class StreamFile(msgspec.Struct, frozen=True):
         return [characters(entry, self.source) for entry in self.entries]
 
     def script(self) -> list[ScriptItem]:
-        """All transmissions and actions. Raises StreamError for a level on a pin, which no board leaves open."""
-        return [
-            entry.what if isinstance(entry.what, Action) else characters(entry, self.source)
-            for entry in self.entries
-        ]
+        """All transmissions and actions; a level on a pin is a put."""
+        return [put_on_pin(entry.what) for entry in self.entries]
 
 
 def characters(entry: Entry, source: str) -> Transmission:

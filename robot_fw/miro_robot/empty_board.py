@@ -61,7 +61,7 @@ class EmptyBoard(ProcessorBoard):
         "fresh_pages": Octets(_PAGE * (1 + 2 * _PAGE)),
         "registers": ChipRegisters,
     }
-    NOT_HASHED = ("pages", "registers")
+    NOT_HASHED: tuple[str, ...] = ("pages", "registers")
     NOT_STATE: tuple[str, ...] = (
         *("spec", "shared", "image", "loops", "stop_at", "stop_at_end"),
         *("sent", "listening", "input_tick", "forced", "again"),

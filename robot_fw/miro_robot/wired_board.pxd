@@ -14,6 +14,7 @@ cdef class WiredBoard(EmptyBoard):
     cdef readonly list starved
     cdef readonly Nets nets
     cdef long long horizon
+    cdef unsigned char outside[4]
     cdef int pushed[4]
     cdef int on_bus
     cdef readonly int drives_rxd

@@ -53,10 +53,12 @@ class WiredBoard(EmptyBoard):
     """`parts` in the order of their names, on the nets of `netlist`. A run raises PluginError for a part that fails.
 
     `starved`: where interrupts took all of 10 ms from the main loop, which is no fault of a board.
+    `outside`: levels that a test puts on port pins that nothing drives; it pulls low, or lets go.
     `drives_rxd`: something on the board drives P3.0, so that nothing else can send to its serial port.
     """
 
-    STATE = {"latched": ("8B", 0, 0xFF), "parts": [Part]}
+    STATE = {"latched": ("8B", 0, 0xFF), "outside": ("4B", 0, 0xFF), "parts": [Part]}
+    NOT_HASHED: tuple[str, ...] = ("outside",)
     NOT_STATE = (
         *("nets", "horizon", "part_index", "pushed", "starved", "on_bus", "drives_rxd"),
         *("latch_count", "latch_address", "latch_mask", "buffer_count", "buffer_address", "buffer_mask"),
@@ -76,6 +78,7 @@ class WiredBoard(EmptyBoard):
         self.part_index = {part.name: index for index, part in enumerate(self.parts)}
         self.nets = Nets(netlist, self.parts)
         self.horizon = -1  # of the piece of a run that the CPU is in; -1 between two runs
+        self.outside = [0xFF] * 4
         self.pushed = [0xFF] * 4  # what the CPU was given of the ports
         self.starved: list[FirmwareFault] = []
         wired = self.nets.wired
@@ -201,8 +204,8 @@ class WiredBoard(EmptyBoard):
         nets = self.nets
         if nets.ports_changed:
             for port in range(4):
-                if nets.external[port] != self.pushed[port]:
-                    self._push_port(port, nets.external[port], tick)
+                if nets.external[port] & self.outside[port] != self.pushed[port]:
+                    self._push_port(port, nets.external[port] & self.outside[port], tick)
             nets.ports_changed = 0
         if nets.suspect_count and not self.forced:
             self._judge(tick)
@@ -319,13 +322,17 @@ class WiredBoard(EmptyBoard):
     # Tests
 
     def put(self, name: str, key: str, value: Any, tick: int) -> int:
-        """A test puts a value of a part, between two instructions, before all else at `tick`.
+        """A test puts a value of a part, or a level on pin `key` of port `name`, between two instructions, before all
+        else at `tick`.
 
         Returns 0, or STOPPED for a fault at which a run stops. Raises PluginError for a part that fails.
         """
         faults = self.fault_count
         tick = max(tick, self.cpu.cycles * CYCLE_TICKS)
         self.sync(tick - 1)
+        if name not in self.part_index:
+            self._put_pin(int(name[1]), int(key), value, tick)
+            return 0
         index = self.part_index[name]
         part: Part = self.parts[index]
         try:
@@ -339,6 +346,10 @@ class WiredBoard(EmptyBoard):
         self.nets.settle(tick)
         self._push(tick)
         return STOPPED if self.stop_on_fault and self.fault_count > faults else 0
+
+    def _put_pin(self, port: int, bit: int, level: int, tick: int) -> None:
+        self.outside[port] = self.outside[port] & ~(1 << bit) | level << bit
+        self._push_port(port, self.nets.external[port] & self.outside[port], tick)
 
     def value(self, name: str, key: str) -> float | int | bool | str:
         """A value of a part as it is now, of a plain type. Raises PluginError for what no file can hold (NaN,
@@ -428,7 +439,7 @@ class WiredBoard(EmptyBoard):
             self.nets.write_latch(index, -1, self.latched[index])
         self.nets.show_all()
         for port in range(4):
-            self.pushed[port] = self.nets.external[port]
+            self.pushed[port] = self.nets.external[port] & self.outside[port]
 
     def __repr__(self) -> str:
         return f"WiredBoard({self.spec.name}, cycle={self.cpu.cycles}, pc={self.cpu.pc:04X}h, parts={len(self.parts)})"

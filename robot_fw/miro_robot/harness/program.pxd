@@ -13,7 +13,7 @@ cdef class Program:
     cdef unsigned char characters[2048]
     cdef unsigned char flaws[2048]
     cdef long long pauses[2048]
-    cdef readonly int choices, puts
+    cdef readonly int choices, pins, puts
     cdef int put_places[256]
     cdef long long put_ticks[256]
     cdef int put_choices[256]
@@ -40,7 +40,7 @@ cdef class Program:
     cdef int _one_frame(self) except -1
     cdef int _operation(self, int kind) except -1
     @cython.locals(which=int, value=int, ticks='long long')
-    cdef int _one_put(self) except -1
+    cdef int _one_put(self, bint pin) except -1
     cdef bint _has_put(self) noexcept
     cdef int _frame_operation(self, int kind) except -1
     cdef void _payload_from_input(self) noexcept

@@ -25,9 +25,11 @@ Velocity -32768 is an encoding error, which no host sends: -32767 goes out in it
 A wire format of somebody else's comes in as `repair`, a function from a frame's body to its characters; its bodies are
 a count - 1 (low 5 bits, times 8 if the upper 3 are 1) and so many bytes, or what is left, for all frame operations.
 
-On a board with values and pins that somebody can put, nibbles 1 to 4 of a session put one of them, and take 20 us:
+On a board with values of parts and pins that somebody can put, nibbles 1 to 4 of a session put one of them, and take
+480 ticks; where there are none of one kind, all four put the other:
 
-    1 2 3 4  PUT            which (mod their number), value (16 bits, low byte first)
+    1 2 3    PUT            which value (mod their number), 16 bits, low byte first
+    4        PIN            which pin (mod their number), 16 bits
 """
 
 from __future__ import annotations
@@ -77,8 +79,9 @@ class Program:
     """Reads inputs for robot `slot` of `robots`. After `read`: `count` characters, each with the pause before it, and
     the pause after the last one, `trailing_ticks`.
 
-    `how` is BYTES, FRAMES or SESSION. `repair`: another wire format. `character_ticks`: of the line. `choices`: how
-    many values can be put. Of each of the `puts`: the character after it, ticks since the begin, which, what.
+    `how` is BYTES, FRAMES or SESSION. `repair`: another wire format. `character_ticks`: of the line. `choices`,
+    `pins`: how many values and pins can be put; pins are numbered behind the values. Of each of the `puts`: the
+    character after it, ticks since the begin, which, what.
     """
 
     NOT_STATE = ("*",)
@@ -91,6 +94,7 @@ class Program:
         repair: Callable[[bytes], bytes] | None = None,
         character_ticks: int = 0,
         choices: int = 0,
+        pins: int = 0,
     ) -> None:
         if not BYTES <= how <= SESSION:
             raise ValueError(f"how = {how}: give BYTES, FRAMES or SESSION")
@@ -104,6 +108,7 @@ class Program:
         self.flaws = bytearray(2048)  # bad stop bit; reset before it
         self.pauses = [0] * 2048
         self.choices = choices
+        self.pins = pins
         self.put_places = [0] * 256
         self.put_ticks = [0] * 256
         self.put_choices = [0] * 256
@@ -213,8 +218,8 @@ class Program:
             self._seal((hdr & 0xC0) | self._seq)
 
     def _operation(self, kind: int) -> None:
-        if self.choices and 1 <= kind <= 4:
-            self._one_put()
+        if self.choices + self.pins and 1 <= kind <= 4:
+            self._one_put(kind == 4)
         elif kind < 9 and kind != 8:
             self._frame_operation(kind)
         elif kind == 8:
@@ -239,8 +244,12 @@ class Program:
             self._pause(_UP_TICKS + _RESET_TICKS)
             self._flags |= _RESET
 
-    def _one_put(self) -> None:
-        which = self._next() % self.choices
+    def _one_put(self, pin: bool) -> None:
+        which = self._next()
+        if self.pins and (pin or not self.choices):
+            which = self.choices + which % self.pins
+        else:
+            which %= self.choices
         value = self._next()
         value |= self._next() << 8
         ticks = self.length + self.trailing_ticks

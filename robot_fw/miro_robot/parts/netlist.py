@@ -5,6 +5,8 @@ from __future__ import annotations
 import msgspec
 
 PORT_PINS = 32
+SERIAL_PINS = (24, 25)
+"""P3.0 and P3.1."""
 MOST_NETS = 256
 MOST_PARTS = 64
 
@@ -40,3 +42,15 @@ class Netlist(msgspec.Struct, frozen=True, kw_only=True):
     lows: tuple[int, ...] = ()
     latches: tuple[tuple[int, ...], ...] = ()
     buffers: tuple[tuple[int, ...], ...] = ()
+
+    def free_pins(self) -> list[str]:
+        """Port pins that nothing but a pull-up is on, without those of the serial port."""
+        taken = {place.net for places in self.parts for place in places}
+        taken.update((*self.pull_downs, *self.highs, *self.lows))
+        taken.update(net for nets in (*self.latches, *self.buffers) for net in nets)
+        taken.discard(-1)
+        return [
+            port_pin(number)
+            for number, net in enumerate(self.ports)
+            if net not in taken and number not in SERIAL_PINS
+        ]

@@ -1,7 +1,11 @@
-"""The values of a board's parts by their path, `PART.KEY`: what a test may put, and what it may read."""
+"""The values of a board's parts by their path, `PART.KEY`: what a test may put, and what it may read.
+
+A level can be put on a port pin that nothing drives, too: `P1.0 = 0`.
+"""
 
 from __future__ import annotations
 
+import re
 from collections.abc import Mapping, Sequence
 from typing import Any
 
@@ -12,6 +16,7 @@ from miro_exact.plugins import use_one_of
 from miro_protocol.toml_text import TomlError, struct_of
 from miro_robot.parts.keys import PartKeys
 
+_PORT_PIN = re.compile(r"P[0-3]\.[0-7]")
 Parts = Mapping[str, PartKeys]
 """The parts of a board by their names."""
 
@@ -23,7 +28,11 @@ def checked_read(parts: Parts, path: str) -> tuple[str, str]:
 
 
 def checked_put(parts: Parts, path: str, value: Any) -> tuple[str, str, Any]:
-    """Part, key, and the value as the part takes it. Raises ValueError: reason; remedy."""
+    """Part, key, and the value as the part takes it; of a pin, port and bit. Raises ValueError: reason; remedy."""
+    if _PORT_PIN.fullmatch(path) and path[:2] not in parts:
+        if value not in (0, 1):
+            raise ValueError(f"{path} = {value!r}: is no level; use 0 or 1")
+        return path[:2], path[3:], int(value)
     name, key, keys = _part_of(parts, path)
     _known(path, key, list(keys.PUTS), f"nothing can be put at {key!r} of part {name!r} ({keys.name})")
     kind = keys.PUTS[key]

@@ -28,6 +28,7 @@ from miro_exact.bad_input import BadInput, did_you_mean
 from miro_exact.inputs import path_beside
 from miro_protocol.toml_text import TomlError, check_numbers, struct_of
 from miro_robot.board_spec import BoardSpec
+from miro_robot.parts.resolve import resolve
 from miro_robot.parts.values import checked_put
 from miro_sim.scenario import file as robots_file
 from miro_sim.scenario.base import SCENARIO, is_path, with_base
@@ -226,10 +227,13 @@ def _strapped(board: BoardSpec, levels: dict[str, int]) -> BoardSpec:
 def _puts(board: BoardSpec, table: Table) -> dict[str, Any]:
     """The values in `put`, by PART.KEY, as the parts take them."""
     parts = {name: part.keys for name, part in board.parts.items()}
+    pins = resolve(board).free_pins()
     puts = {}
     for path, value in _flat(table):
         try:
-            puts[path] = checked_put(parts, path, value)[2]
+            name, _, puts[path] = checked_put(parts, path, value)
+            if name not in parts and path not in pins:
+                raise ValueError("something is wired to it; put a value of that")
         except ValueError as error:
             reason, _, remedy = f"{error}".removeprefix(f"{path}: ").partition("; ")
             raise BadInput("", f"put.{path}", reason, remedy) from None

@@ -56,7 +56,13 @@ class BoardAlone(Device):
         return stopped or Device.run(self, tick)
 
     def check_put(self, path: str, value: PutValue) -> None:
-        checked_put(self.parts, path, value)
+        name, _, _ = checked_put(self.parts, path, value)
+        if name in self.parts:
+            return
+        if not isinstance(self.board, WiredBoard):
+            raise ValueError(f"{path}: no board file says what is wired to it; `mirotwin fw run` has --pins")
+        if path not in self.board.nets.netlist.free_pins():
+            raise ValueError(f"{path}: something is wired to it; put a value of that, or choose another pin")
 
     def put(self, path: str, value: PutValue, tick: int) -> None:
         part, key, taken = checked_put(self.parts, path, value)

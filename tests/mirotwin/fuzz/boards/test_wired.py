@@ -7,12 +7,14 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from miro_exact.bad_input import BadInput
+from miro_protocol.stream import parse
 from miro_sim.scenario.board_scenario import load_any
 from mirotwin.fuzz.board_target import BoardTarget
 from mirotwin.fuzz.oracle import BoardOracle
 from mirotwin.fuzz.wired import WiredMachine
 from mirotwin.shell.firmware_image import image_for
 from mirotwin.verify.steps.reading import steps_in
+from tests.mirotwin.board_files import ECHO, board_folder
 
 BOARDS = Path(__file__).parents[4] / "examples" / "boards"
 
@@ -37,7 +39,7 @@ def cpu_of(board):
 SESSION = st.lists(
     st.one_of(
         st.sampled_from([b"\x09\x00g", b"\x09\x00e", b"\x09\x00?", b"\x0a\x40", b"\x0b\x05", b"\x0f"]),
-        st.tuples(st.just(b"\x01"), st.binary(min_size=3, max_size=3)).map(b"".join),
+        st.tuples(st.sampled_from([b"\x01", b"\x04"]), st.binary(min_size=3, max_size=3)).map(b"".join),
         st.binary(max_size=4),
     ),
     max_size=10,
@@ -77,7 +79,7 @@ def test_without_steps_they_begin_when_the_firmware_has_settled():
 
 def test_what_can_be_put_follows_from_the_types_of_the_parts(car):
     choices = dict(car.machine.choices)
-    assert list(choices) == [
+    assert list(choices)[: car.machine.values] == [
         f"{name}.{key}" for name, keys in car.machine.device.parts.items() for key in keys.PUTS
     ]
     distance = choices["eyes.distance_cm"]
@@ -85,6 +87,9 @@ def test_what_can_be_put_follows_from_the_types_of_the_parts(car):
     assert [choices["eyes.echo"](bits) for bits in range(4)] == ["high", "low", "none", "normal"]
     assert [choices["left.blocked"](bits) for bits in range(3)] == [False, True, False]
     assert choices["left.load_nm"](0) == 0.0
+    pins = list(choices)[car.machine.values :]
+    assert {"P0.0", "P1.3", "P3.7"} < {*pins}
+    assert not {"P1.0", "P1.1", "P2.5", "P3.0", "P3.1"} & {*pins}  # parts, and the serial port
     for value_of in choices.values():
         assert len({value_of(bits) for bits in range(0, 0x10000, 17)}) > 1
 
@@ -111,3 +116,37 @@ def test_steps_that_send_bring_the_board_up_too():
     target = target_of("car/stops.scenario.toml", 2)
     assert [item.data for item in target.machine.script] == [b"g"]
     assert target.harness.begin_tick >= target.machine.script[0].tick + 10 * target.harness.bit_ticks
+
+
+READS_A_PIN = ECHO.replace("MOV SBUF,A\nJNB TI,$", "MOV C,P1.3\nMOV ACC.7,C\nMOV SBUF,A\nJNB TI,$")
+"""Bit 7 of what it sends back is P1.3."""
+
+
+def test_an_input_puts_levels_on_pins_that_nothing_drives_and_a_stream_does_so_too(tmp_path):
+    path = board_folder(tmp_path, program=READS_A_PIN)
+    text = load_any(str(path))
+    image = image_for(text)
+    target = BoardTarget(image, machine=WiredMachine(text.scenario, image))
+    pin = [path for path, _ in target.machine.choices[target.machine.values :]].index("P1.3")
+    low, high = bytes([4, pin, 0, 0]), bytes([4, pin, 1, 0])
+    character = b"\x09\x00A\x0a\x20"
+    data = character + low + character + high + character
+    target.run(data)
+    assert [value for value, _ in target.machine.said] == [0xC1, 0x41, 0xC1]
+    assert [line.split(": ")[1] for line in target.describe(data).splitlines()] == [
+        *("41", "P1.3 = 0", "41", "P1.3 = 1", "41"),
+    ]  # fmt: skip
+    stream = BoardOracle(target, {}).judged(data, {}).stream()
+    assert target.inputs_of(parse(stream).script()) == [data.removesuffix(b"\x0a\x20")]
+    without = stream.replace("P1.3 = 0", "P1.3 0").replace("P1.3 = 1", "P1.3 1")
+    assert parse(without).script() == parse(stream).script()
+
+
+def test_a_pin_with_something_wired_to_it_is_put_by_no_scenario(tmp_path):
+    path = board_folder(tmp_path)
+    path.write_text(path.read_text().replace("put = { key.pressed = true }", "put = { P2.0 = 1 }"))
+    with pytest.raises(BadInput, match=r"put\.P2\.0: something is wired to it; put a value of that"):
+        load_any(str(path))
+    path.write_text(path.read_text().replace("P2.0 = 1", "P1.3 = 2"))
+    with pytest.raises(BadInput, match=r"P1\.3.* is no level; use 0 or 1"):
+        load_any(str(path))
