@@ -36,6 +36,19 @@
   const rows = all(".serial tr[data-tick]");
   const rowTicks = rows.map((row) => Number(row.dataset.tick));
 
+  const cars = all(".plane").map((plane) => {
+    const ahead = plane.querySelector(".ahead");
+    const [ticks, heading] = data.ways[ahead.dataset.car];
+    return { ticks, heading, points: ahead.getAttribute("points").trim().split(" "), trail: plane.querySelector(".trail"), body: plane.querySelector(".car") };
+  });
+  function drive(tick) {
+    for (const { ticks, points, trail, body, heading } of cars) {
+      const count = Math.max(1, passed(ticks, tick));
+      trail.setAttribute("points", points.slice(0, count).join(" "));
+      body.setAttribute("transform", `translate(${points[count - 1].replace(",", " ")}) rotate(${valueAt(heading, tick)})`);
+    }
+  }
+
   function tellEvents(tick) {
     const list = byId("events-now");
     if (!list) return;
@@ -61,6 +74,7 @@
     const current = passed(rowTicks, tick) - 1;
     rows.forEach((row, at) => { row.classList.toggle("past", at <= current); row.classList.toggle("current", at === current); });
     tellEvents(tick);
+    drive(tick);
     for (const cursor of window.plots.cursors) cursor.location = tick / data.ticks_per_s;
     document.dispatchEvent(new CustomEvent("moment", { detail: tick }));
   }

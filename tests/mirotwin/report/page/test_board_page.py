@@ -110,6 +110,44 @@ def test_a_display_is_any_part_with_a_text_to_read(rover):
     assert any(rows.startswith("150 cm") for rows in values), values
 
 
+def test_a_cars_way_stands_among_its_walls(tmp_path, mirotwin):
+    mirotwin.succeeds("run", ROVER.parents[1] / "car/drives.scenario.toml", "--out", tmp_path / "run", "-q")
+    mirotwin.succeeds("report", tmp_path / "run", "-o", tmp_path / "page.html", "-q")
+    text, data = (tmp_path / "page.html").read_text(), Markup(tmp_path / "page.html").data
+    assert text.count('<line class="wall"') == 4
+    ticks, heading = data["ways"]["car"]
+    points = re.search(r'<polyline class="way ahead" data-car="car" points="([^"]*)"', text)[1].split()
+    assert (len(points), heading) == (len(ticks), "car.heading_deg")
+    assert points[0] == "40.00,100.00"
+    x_cm, y_cm = (float(one) for one in points[-1].split(","))
+    assert (x_cm, y_cm) == pytest.approx([data["values"][f"car.{key}_cm"][1][-1] for key in "xy"], abs=0.01)
+
+
+PICTURE = """
+crystal_hz = 11_059_200
+[parts.left]
+part = "dc_motor"
+pins = { a = "P1.0", b = "P1.1" }
+[parts.right]
+part = "dc_motor"
+pins = { a = "P1.2", b = "P1.3" }
+[parts.car]
+part = "car"
+pins = { left = "left.shaft", right = "right.shaft" }
+picture = ["##..", "...#"]
+cell_cm = 5
+"""
+
+
+def test_the_dark_cells_of_a_floor_are_drawn(tmp_path, mirotwin):
+    scenario = board_folder(
+        tmp_path, 'board = "lamp.board.toml"\nfirmware = "lamp.hex"\nduration_s = 0.2\n', PICTURE
+    )
+    mirotwin.succeeds("run", scenario, "--out", tmp_path / "run", "-q")
+    mirotwin.succeeds("report", tmp_path / "run", "-o", tmp_path / "page.html", "-q")
+    assert 'd="M15 2.5h5M0 7.5h10"' in (tmp_path / "page.html").read_text()
+
+
 def test_the_lanes_are_the_nets_that_moved_in_the_order_of_the_board(rover):
     document = rover.read_text()
     names = [
