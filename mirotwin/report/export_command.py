@@ -19,10 +19,13 @@ from mirotwin.recording.capture.input import STDIN, Input
 from mirotwin.recording.capture.layout import look
 from mirotwin.recording.capture.source import READ_ERRORS, open_source
 from mirotwin.recording.decode_command import FORMAT
+from mirotwin.report.board_export import HEAD_BYTES, board_capture, board_csv, board_stream, is_of_board
+from mirotwin.runs.job import load_job
 from mirotwin.shell.command import Argument, Option, Options, command_of
 from mirotwin.shell.console import show
-from mirotwin.shell.options import FORCE, NAME, NETWORK, OUT, QUIET, Engine
+from mirotwin.shell.options import FIRMWARE, FORCE, NAME, NETWORK, OUT, QUIET, Engine
 from mirotwin.shell.outputs import check_new, whole_file
+from mirotwin.shell.part_files import Parts, bring_parts
 from mirotwin.shell.program import complain
 from mirotwin.shell.progress import ProgressBar
 from mirotwin.shell.verdicts import BAD_INPUT, DONE
@@ -48,8 +51,8 @@ def export_foxglove(given: Input, format: str, out: str, quiet: bool) -> int:
     return DONE
 
 
-DEFAULTS = {".stream": "stream", ".txt": "stream", ".mcap": "foxglove"}
-TARGETS = ("pcapng", "stream", "foxglove")
+DEFAULTS = {".csv": "csv", ".stream": "stream", ".txt": "stream", ".mcap": "foxglove"}
+TARGETS = ("pcapng", "stream", "foxglove", "csv")
 
 
 class Exported:
@@ -93,11 +96,15 @@ class ExportOptions(Options, frozen=True, kw_only=True):
         Option(
             "--as",
             type=click.Choice(TARGETS),
-            help="What to write. Default: stream for *.stream and *.txt, foxglove for *.mcap, else pcapng.",
+            help="What to write. Default, by ending: .stream, .txt stream; .mcap foxglove; .csv csv; else pcapng.",
         ),
     ] = None
+    firmware: Annotated[str | None, FIRMWARE.saying("Stream of a board: its image, which runs for CSV.")] = (
+        None
+    )
     format: Annotated[str | None, FORMAT.saying(FORMAT.help, type=click.Choice(TIMED))] = None
     network: Annotated[int | None, NETWORK.saying("Only this network. Default: all.")] = None
+    parts: Parts = ()
     force: Annotated[bool, FORCE] = False
     quiet: Annotated[bool, QUIET.saying("No progress bar and no closing line.")] = False
     engine: Engine = None
@@ -126,6 +133,9 @@ def export(options: ExportOptions) -> int:
 
     \b
         mirotwin export run.mcap --out foxglove.mcap
+
+    The stream file of a board's run holds the board, what was put into its parts, and what it sent. As CSV it is run
+    again: how all nets and values of parts stood, and each change, with its tick.
     """
     out, network, quiet = options.out, options.network, options.quiet
     if out != STDIN:
@@ -137,6 +147,11 @@ def export(options: ExportOptions) -> int:
         format = options.format or detect(given.peek())[0]
         if to == "foxglove":
             return export_foxglove(given, format, out, quiet)
+        if options.file != STDIN and is_of_board(given.peek(HEAD_BYTES), format):
+            return export_board(options, to)
+        if to == "csv":
+            reason = f"{NAMES[format]} of no board, whose nets and values would be in it"
+            raise BadInput(given.label, "--as csv", reason, "give a file (not -) of a run of a board")
         if format not in TIMED:
             raise BadInput(
                 given.label, "", f"{NAMES[format]} without times", "give a recording, stream or capture"
@@ -156,6 +171,24 @@ def export(options: ExportOptions) -> int:
     if exported.failure is not None:
         complain(f"error: {exported.failure}; everything before it was written")
         return BAD_INPUT
+    return DONE
+
+
+def export_board(options: ExportOptions, to: str) -> int:
+    """Writes a run of a board; returns the exit code. Raises BadInput."""
+    bring_parts(options.parts)
+    job = load_job(options.file, options.firmware)
+    complain(*job.notes)
+    with ProgressBar("running it again", job.end_tick, options.quiet or to != "csv") as bar:
+        pieces: Iterable[bytes]
+        if to == "csv":
+            pieces = board_csv(job, bar.to)
+        else:
+            pieces = board_capture(job, complain) if to == "pcapng" else [board_stream(job).encode()]
+        _write(options.out, pieces)
+    if not options.quiet and options.out != STDIN:
+        line = f"; mirotwin replay {options.out} --firmware IMAGE plays it again" if to == "stream" else ""
+        show(f"{options.out}: {job.end_tick / job.spec.scenario.clock:.3f} s of a board{line}")
     return DONE
 
 

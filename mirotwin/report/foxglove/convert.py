@@ -58,7 +58,10 @@ class Conversion:
                 scenario = parse(recording.source.scenario_text, "")
         except BadInput as error:
             without = "so there are no camera, no ball, no patches and no references in the scene"
-            self.notes.append(f"{error}; {without}")
+            board = (
+                f"{path}: is of a board: `/net0/values` has the values of its parts, and there is no scene"
+            )
+            self.notes.append(board if recording.source.board else f"{error}; {without}")
         self.derive = Derived(scenario)
         self.writer = McapWriter(stream, profile=METADATA, library=METADATA)
         self._images = msgspec.json.Decoder(ImageMessage)

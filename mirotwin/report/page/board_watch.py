@@ -7,6 +7,7 @@ here, so that a page can say where.
 from __future__ import annotations
 
 from array import array
+from operator import itemgetter
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -58,7 +59,7 @@ class BoardWatch:
     """Watches the first board of a world from where it stands to its end; changes no bit of its run."""
 
     def __init__(self, world: World) -> None:
-        self._world = world
+        self._world, self.begin_tick = world, world.tick
         device, self._changes = world.devices[0], world.devices[0].changes
         self._values = {path: ([world.tick], [value]) for path, value in device.values().items()}
         self._edges: list[array[int]] = []
@@ -114,6 +115,18 @@ class BoardWatch:
             since = [max(first_tick, ticks[at]) for at in kept]
             found.append(Changed(path, since, [values[at] for at in kept], end - first - 1))
         return found
+
+    def changes(self, end_tick: int) -> list[tuple[int, str, str, Any]]:
+        """All nets and values at the begin, and each change of one: tick, kind, name, what it is from then on."""
+        rows = [
+            (tick, "value", path, value)
+            for path, (ticks, values) in self._values.items()
+            for tick, value in zip(ticks, values, strict=True)
+        ]
+        for net, edges in enumerate(self._edges):
+            name, level, ticks = self._nets.all_names[net], self._levels[net], (self.begin_tick, *edges)
+            rows += [(tick, "net", name, level ^ number & 1) for number, tick in enumerate(ticks)]
+        return sorted((row for row in rows if row[0] < end_tick), key=itemgetter(0))
 
 
 def _thinned(values: list[Any], first: int, end: int) -> list[int]:

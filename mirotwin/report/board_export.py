@@ -1,0 +1,98 @@
+"""A run of a board for other programs: as a stream file that plays it again, and as CSV of its nets and values."""
+
+from __future__ import annotations
+
+import csv
+from collections.abc import Callable, Iterator, Sequence
+from contextlib import suppress
+from io import BytesIO, StringIO
+from typing import Any
+
+from msgspec.structs import replace
+
+from miro_exact.bad_input import BadInput
+from miro_exact.clock import TICKS_PER_SECOND
+from miro_protocol import stream
+from miro_protocol.actions import ScriptItem
+from miro_protocol.stream import StreamError
+from miro_protocol.transmission import Transmission
+from miro_sim.scenario.board import BoardScenario
+from miro_sim.scenario.board_scenario import tables_of_board
+from mirotwin.recording.capture.recorded import in_usual_ticks, transmissions_of, units_line
+from mirotwin.recording.capture.render import to_pcapng
+from mirotwin.recording.container import RecordingError
+from mirotwin.recording.messages import Messages
+from mirotwin.runs.board_case import is_for_board
+from mirotwin.runs.job import Job
+from mirotwin.runs.run import Run, replaying
+from mirotwin.shell.options import plain_parameters
+from mirotwin.verify.cases.case import stream_text
+
+HEAD_BYTES = 1 << 20
+"""Of a file; what it is of stands before all else."""
+
+
+def is_of_board(head: bytes, format: str) -> bool:
+    """Whether a recording or a stream file that begins so is of a board."""
+    messages = Messages(BytesIO(head).read, "", ())
+    reader = stream.Reader(head.decode("utf-8", "replace").split("\n"))
+    with suppress(RecordingError, StreamError):
+        next(iter(messages if format == "recording" else reader), None)
+    return "board" in (messages.metadata or {}) or is_for_board(reader.header)
+
+
+def board_stream(job: Job) -> str:
+    """All that was sent and put, and what it sent, with the whole scenario: `mirotwin replay` does it again.
+
+    Raises BadInput for a run that went on from a saved one.
+    """
+    spec, scenario = job.spec, job.spec.scenario
+    assert isinstance(scenario, BoardScenario)
+    if spec.resumed:
+        reason = "went on from a saved world, which a stream file does not hold"
+        raise BadInput(spec.origin, "", reason, "replay the recording")
+    ends = replace(scenario, duration_ticks=scenario.duration_ticks or job.end_tick)
+    more: dict[str, Any] = {"end_tick": job.end_tick, "crystal_hz": scenario.clock}
+    if scenario.expect:
+        more["expect"] = scenario.expect
+    more["scenario"] = tables_of_board(ends)
+    return stream_text(_script(job), spec.image, {"seed": spec.seed}, job.case.verdict, more)
+
+
+def board_capture(job: Job, tell: Callable[[str], None]) -> Iterator[bytes]:
+    """The characters each way as pcapng; `tell` gets what a capture does not hold."""
+    script, clock = _script(job), job.spec.scenario.clock
+    sent = [in_usual_ticks(item, clock) for item in script if isinstance(item, Transmission)]
+    if clock != TICKS_PER_SECOND:
+        tell(units_line(job.spec.origin, clock))
+    if len(sent) < len(script):
+        tell(
+            f"{job.spec.origin}: what was put or done was left out: a capture holds none, a stream file does"
+        )
+    return to_pcapng(sent)
+
+
+def _script(job: Job) -> Sequence[ScriptItem]:
+    """What was sent each way and done, in the order of time; of a stream file, what it says."""
+    done = (action for period in job.recorded for action in period.actions)
+    return (
+        sorted((*transmissions_of(job.recorded), *done), key=lambda item: item.tick) or job.spec.script or ()
+    )
+
+
+def board_csv(job: Job, progress: Callable[[int], object]) -> Iterator[bytes]:
+    """How all nets and values stood at first, and each change, in the order of time: of a run that is made for it."""
+    from mirotwin.report.page.board_watch import BoardWatch  # a hot module: not before the engine was chosen
+
+    spec = replace(job.spec, until_tick=job.end_tick)
+    with plain_parameters(spec.origin, "replayed"):
+        world = spec.world()
+    watch = BoardWatch(world)
+    with replaying(spec.origin, world):
+        Run(spec, world).play(progress)
+    rows = [("tick", "time_s", "kind", "name", "value")]
+    rows += [(tick, f"{tick / world.clock:.9f}", *more) for tick, *more in watch.changes(job.end_tick)]
+    for begin in range(0, len(rows), 1000):
+        text = StringIO(newline="")
+        csv.writer(text, lineterminator="\n").writerows(rows[begin : begin + 1000])
+        yield text.getvalue().encode()
