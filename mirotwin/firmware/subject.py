@@ -12,7 +12,7 @@ from miro_exact.bad_input import BadInput
 from miro_exact.plugins import use_one_of
 from miro_robot.inspect.watcher import Watcher
 from miro_sim.radio.downlink import TransmissionError
-from miro_sim.scenario.board_scenario import is_board, load_any
+from miro_sim.scenario.board_scenario import AnyText, BoardText, is_board, load_any
 from miro_sim.scenario.file import builtin_names
 from miro_sim.world.world import World
 from mirotwin.firmware.bare_options import (
@@ -26,6 +26,7 @@ from mirotwin.firmware.bare_options import (
 from mirotwin.runs.inspected_run import InspectedRun, watch
 from mirotwin.runs.job import load_job
 from mirotwin.runs.result import fault_lines
+from mirotwin.runs.run import scripted
 from mirotwin.runs.spec import RunSpec
 from mirotwin.shell.command import Argument, Options
 from mirotwin.shell.firmware_image import image_for
@@ -187,10 +188,9 @@ def _robot_run(options: SubjectOptions) -> InspectedRun:
         _refuse(options, "a scenario, of which nothing is judged here", "expected")
         text = load_any(subject, options.settings)
         tell_notes(text.notes)
-        refuse_steps(text.scenario, subject)
-        image = image_for(text, options.firmware)
+        spec = RunSpec.of(text, image_for(text, options.firmware), options.seed or 0)
         with plain_parameters(subject):
-            world = RunSpec.of(text, image, options.seed or 0).world()
+            world = (_by_steps(spec, text) if text.scenario.step else spec).world()
     else:
         _refuse(options, "a recording or stream, which has its seed", "seed")
         settings = (*options.settings, *as_settings(options.expected))
@@ -205,6 +205,16 @@ def _robot_run(options: SubjectOptions) -> InspectedRun:
         _refuse(options, "a board", "network", "slot")
     network, index = _which_robot(world, options)
     return InspectedRun(world, network, index, end_tick, job)
+
+
+def _by_steps(spec: RunSpec, text: AnyText) -> RunSpec:
+    """The run of a board that its steps drive, as what they sent and did. Raises BadInput for robots."""
+    from mirotwin.verify.steps.reading import steps_in  # `fw run` starts without
+
+    if not isinstance(text, BoardText):
+        refuse_steps(text.scenario, text.origin)
+    with ProgressBar("doing its steps", spec.scenario.end_tick) as bar:
+        return scripted(msgspec.structs.replace(spec, steps=steps_in(text)), bar.to)
 
 
 def _which_robot(world: World, options: SubjectOptions) -> tuple[int, int]:

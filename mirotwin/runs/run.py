@@ -253,7 +253,7 @@ class Run:
             scenario=scenario,
             image=world.image,
             seed=world.seed,
-            script=self._known_trace().script(),
+            script=self.script(),
             until_tick=world.tick,
         )
         try:
@@ -263,9 +263,20 @@ class Run:
         failure = next((one for one in again.failures if one.check in expect), None)
         return None if failure is None else self.stream(expect, str(failure))
 
+    def script(self) -> Sequence[ScriptItem]:
+        """What went into it."""
+        return self._known_trace().script()
+
     def _known_trace(self) -> Trace:
         assert self.trace is not None, "nobody traced the run, or it began with what another one had saved"
         return self.trace
+
+
+def scripted(spec: RunSpec, progress: Callable[[int], object] = lambda tick: None) -> RunSpec:
+    """The run of a board with steps, as what they sent and did: it can be stopped anywhere then."""
+    run = Run.traced(spec).play(progress)
+    scenario = msgspec.structs.replace(spec.scenario, bit_ticks=run.world.bit_ticks)
+    return msgspec.structs.replace(spec, scenario=scenario, steps=(), script=run.script())
 
 
 def robot_spec(

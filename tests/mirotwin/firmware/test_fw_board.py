@@ -55,6 +55,45 @@ def test_the_scenario_of_a_board_is_a_subject_with_what_it_puts(mirotwin, board)
     assert said == "lamp.scenario.toml: is a board, --slot does not apply to it; leave it out"
 
 
+STEPS = """
+[[step]]
+pause_ms = 20
+[[step]]
+send = "text"
+text = "hi"
+[[step]]
+put = { key.pressed = false }
+"""
+
+
+def test_steps_of_a_board_are_done_first_so_that_its_run_can_be_looked_into_and_gone_back_in(mirotwin, board):
+    lines = (
+        'board = "lamp.board.toml"\nfirmware = "lamp.hex"\nduration_s = 0.2\nput = { key.pressed = true }\n'
+    )
+    (board / "lamp.scenario.toml").write_text(lines + STEPS)
+    mirotwin.ends(0, "fw", "vcd", "lamp.scenario.toml", "--out", "lamp.vcd")
+    for wire in ("rxd", "txd"):
+        assert bytes(byte for _, byte in characters(board / "lamp.vcd", wire)) == b"hi"
+    said = mirotwin.succeeds(
+        *(
+            "debug",
+            "lamp.scenario.toml",
+            "-x",
+            "until key.pressed == 0",
+            "-x",
+            "goto 1ms",
+            "-x",
+            "print key.pressed",
+        )
+    )
+    assert "key.pressed == 0 is true" in said
+    assert said.strip().endswith("key.pressed = 1")
+    (board / "lamp.scenario.toml").write_text(
+        lines + STEPS.replace("pause_ms = 20", 'wait_for = "text"\ntext = 1')
+    )
+    assert "step 1" in mirotwin.refuses("debug", "lamp.scenario.toml", "-x", "quit")
+
+
 @pytest.mark.parametrize(
     ("arguments", "said"),
     [
