@@ -106,6 +106,7 @@ def board_page(material: Material, first_tick: int, end_tick: int) -> bytes:
         "curves": curves,
         "displays": displays,
         "beside": beside,
+        "by_path": by_path,
         "cars": cars,
     }
     return render("board.html", figures, json_bytes(data), sections)

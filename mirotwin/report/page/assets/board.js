@@ -36,6 +36,22 @@
   const rows = all(".serial tr[data-tick]");
   const rowTicks = rows.map((row) => Number(row.dataset.tick));
 
+  // Digits of seven segments: two hex digits each, a lowest, dp highest.
+  const SEGMENTS = ["M6 3h8", "M16.5 5.5v11", "M16.5 21.5v11", "M6 35h8", "M3.5 21.5v11", "M3.5 5.5v11", "M6 19h8", "M21 35h0"];
+  const digits = all("[data-segments]").map((svg) => {
+    const { segments: path } = svg.dataset;
+    const count = Math.max(1, valueAt(path, data.end).length / 2);
+    svg.setAttribute("viewBox", `0 0 ${24 * count} 38`);
+    svg.innerHTML = Array.from({ length: count }, (_, at) => `<g transform="translate(${24 * at} 0)">${SEGMENTS.map((d) => `<path d="${d}"/>`).join("")}</g>`).join("");
+    return { path, end: "end" in svg.dataset, lines: [...svg.querySelectorAll("path")] };
+  });
+  function light(tick) {
+    for (const { path, end, lines } of digits) {
+      const codes = valueAt(path, end ? data.end : tick);
+      lines.forEach((line, at) => line.classList.toggle("lit", (parseInt(codes.substr(2 * (at >> 3), 2), 16) >> (at & 7)) & 1));
+    }
+  }
+
   const cars = all(".plane").map((plane) => {
     const ahead = plane.querySelector(".ahead");
     const [ticks, heading] = data.ways[ahead.dataset.car];
@@ -75,6 +91,7 @@
     rows.forEach((row, at) => { row.classList.toggle("past", at <= current); row.classList.toggle("current", at === current); });
     tellEvents(tick);
     drive(tick);
+    light(tick);
     for (const cursor of window.plots.cursors) cursor.location = tick / data.ticks_per_s;
     document.dispatchEvent(new CustomEvent("moment", { detail: tick }));
   }
