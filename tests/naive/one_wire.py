@@ -126,6 +126,8 @@ class Thermometer:
             return
         self.settle(tick)
         if kind == 0x44:
+            if self.coming:
+                return
             bits = 9 + (self.scratch[2] >> 5 & 3)
             step = 2 ** (12 - bits)
             sixteenths = floor(Fraction(self.celsius) * 16 + Fraction(1, 2)) // step * step

@@ -7,10 +7,12 @@ read      |_2_|..............                      for a 0 the chip holds the wi
 
     reset, presence, ROM command (who is meant), function command, bytes; the lowest bit first
 
-A conversion takes the temperature of its begin, and after 94 to 750 ms it is in the scratchpad; before the first one it
-is 85 degrees. With parasite power the wire must stay high meanwhile: where it falls the chip has no supply, and 85
-degrees is what it says then (chosen). Whether the wire is high strongly enough is not judged. Limits of the master's
-times other than the reset's are not judged: a slot that is too short is misread, as by the chip.
+A conversion takes the temperature of its begin, and after 94 to 750 ms it is in the scratchpad; before the first one
+it is 85 degrees. A conversion that is going on is not begun anew by another command to convert (chosen: the sheet does
+not say; programs that ask again every 20 ms are common, and their displays show the temperature). With parasite power
+the wire must stay high meanwhile: where it falls the chip has no supply, and 85 degrees is what it says then (chosen).
+Whether the wire is high strongly enough is not judged. Limits of the master's times other than the reset's are not
+judged: a slot that is too short is misread, as by the chip.
 """
 
 from __future__ import annotations
@@ -269,6 +271,8 @@ class Ds18b20Part(Part):
             self._recall()
 
     def _convert(self, tick: int) -> None:
+        if self.has_sample:
+            return
         bits = self.user[2] >> 5 & 3
         sixteenths = int(self.temperature_c * 16.0 + 0x8000 + 0.5) - 0x8000  # rounded half up
         self.sample = sixteenths & ~((1 << (3 - bits)) - 1)

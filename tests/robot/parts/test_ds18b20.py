@@ -82,6 +82,14 @@ def test_before_the_first_conversion_and_while_it_goes_on_it_says_what_was_there
     assert measured(wire) == 21.5
 
 
+def test_a_program_that_asks_again_meanwhile_gets_the_temperature_all_the_same():
+    wire = bus()
+    for _ in range(50):
+        convert(wire, 21.5, ms=20)
+    assert measured(wire) == 21.5
+    assert wire.value("conversions") == 2
+
+
 @pytest.mark.parametrize(
     ("bits", "us", "shown"), [(9, 93_750, 21.5), (10, 187_500, 21.75), (11, 375_000, 21.875)]
 )
