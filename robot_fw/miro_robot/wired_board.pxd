@@ -5,6 +5,8 @@ from miro_robot.parts.nets cimport Nets
 cdef long long CYCLE_TICKS, NEVER_TICK, _BEHIND_TICKS
 cdef unsigned char _TWO_CYCLES[256]
 cdef int _ADDRESS, _RELEASE, _DATA, _STROBE, _SAMPLE, _STROBE_ENDS, _DATA_ENDS, _PAGE_ENDS, _RXD, _WR, _RD
+cdef int _OUTPUT_PORT[3]
+cdef int _OUTPUT_MASK[3]
 cdef int REPLAN, STOPPED, _CONTENTION, _STARVED
 
 
@@ -17,7 +19,10 @@ cdef class WiredBoard(EmptyBoard):
     cdef unsigned char outside[4]
     cdef int pushed[4]
     cdef int on_bus
-    cdef readonly int drives_rxd
+    cdef readonly int drives_rxd, outputs
+    cdef int output_levels[4]
+    cdef long long output_ticks[3]
+    cdef long long output_tick, output_put
     cdef int latch_count, buffer_count
     cdef int latch_address[8]
     cdef int latch_mask[8]
@@ -37,7 +42,19 @@ cdef class WiredBoard(EmptyBoard):
     cdef inline long long _cycle_of(self, long long due) noexcept
     cdef bint _is_due(self, long long due, long long due_cycle) except -1
     cdef bint _is_before_write(self, long long due_cycle) except -1
+    @cython.locals(due='long long')
+    cdef inline long long _due(self) noexcept
+    @cython.locals(end_tick='long long')
+    cdef int _catch_up(self) except -1
     cdef _step(self)
+    @cython.locals(output=int)
+    cdef int _output_due(self, long long tick) except -1
+    @cython.locals(nets=Nets, port=int, mask=int, levels=int)
+    cdef int _put_output(self, int output, int level, long long tick) except -1
+    @cython.locals(output=int, foreseen='long long', before='long long')
+    cpdef int outputs_changed(self, long long tick) except -1
+    @cython.locals(output=int)
+    cdef int _foresee(self, long long tick) except -1
     @cython.locals(now='long long', nets=Nets)
     cpdef int sync(self, long long tick) except -1
     @cython.locals(port=int, nets=Nets)

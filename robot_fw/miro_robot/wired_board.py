@@ -7,6 +7,11 @@ The CPU runs alone up to the first event of a part that may come to one of its p
 meanwhile. An instruction waits for an event if it begins in a cycle whose S5P2, tick 9, is not before it (P2). A run to
 a tick does what happens before it; what a test puts then comes first on its tick, between two instructions. Contention
 is judged when a tick is over: after its events, or after what the CPU writes on it.
+
+TXD, the data of mode 0 and the clock of timer 2 do not come from latches. Where something is wired to such a pin, the
+serial port or the timer says when its next edge comes if nothing changes, and again after each change of a register
+that it depends on (`outputs_changed`). An edge is an event like that of a part that reaches the CPU, and comes last on
+its tick. So no register is written while an edge is due that came before.
 """
 
 from __future__ import annotations
@@ -41,6 +46,9 @@ _MOST_VALUE = (1 << 63) - 1  # of an integer, and of its negative
 _ADDRESS, _RELEASE, _DATA, _STROBE = 8, 10, 11, 12
 _SAMPLE, _STROBE_ENDS, _DATA_ENDS, _PAGE_ENDS = 17, 18, 19, 20
 _RXD, _WR, _RD = 0x01, 0x40, 0x80  # of P3
+_OUTPUTS = ((3, 1), (3, 0), (1, 0))  # TXD, data of mode 0, clock of timer 2
+_OUTPUT_PORT = [port for port, _ in _OUTPUTS]
+_OUTPUT_MASK = [1 << bit for _, bit in _OUTPUTS]
 _BEHIND_TICKS = 96  # more than an instruction: so far parts may be behind the CPU
 
 
@@ -61,6 +69,13 @@ class WiredBoard(EmptyBoard):
     NOT_HASHED: tuple[str, ...] = ("outside",)
     NOT_STATE = (
         *("nets", "horizon", "part_index", "pushed", "starved", "on_bus", "drives_rxd"),
+        *(
+            "outputs",
+            "output_levels",
+            "output_ticks",
+            "output_tick",
+            "output_put",
+        ),  # follow from the peripherals
         *("latch_count", "latch_address", "latch_mask", "buffer_count", "buffer_address", "buffer_mask"),
     )
 
@@ -84,8 +99,15 @@ class WiredBoard(EmptyBoard):
         wired = self.nets.wired
         self.on_bus = 1 if wired[0] or wired[2] or wired[3] & (_WR | _RD) else 0
         self.drives_rxd = int(self.nets.is_output(self.nets.number("P3.0")))
+        # Bit per output of `_OUTPUTS` that something is wired to; their levels without latches, by port.
+        self.outputs = sum(int(wired[port] >> bit & 1) << place for place, (port, bit) in enumerate(_OUTPUTS))
+        self.output_levels = [0xFF] * 4
+        self.output_ticks = [NEVER_TICK] * 3  # of the next edges
+        self.output_tick = NEVER_TICK  # of the first of them
+        self.output_put = -1  # the tick of the last edge
         self._decode(spec)
         EmptyBoard.__init__(self, spec, image, stop_on_fault, stop_at, stop_at_end)
+        self.cpu.peripherals.listened = self.outputs
         self.cpu.main_loop_limit = spec.crystal_hz // (100 * CYCLE_TICKS)  # cycles in 10 ms
         self.nets.ports_changed = 0xF  # straps hold pins from the beginning
         self._supply(1, 0)
@@ -132,8 +154,7 @@ class WiredBoard(EmptyBoard):
         cpu.begin_run()
         try:
             reason = self._run_pieces(until_cycle)
-            if self.drives_rxd:  # the serial port is brought up to the end of the last instruction
-                self.sync(cpu.cycles * CYCLE_TICKS - 1)
+            self._catch_up()
             return reason
         finally:
             self.horizon = -1
@@ -141,12 +162,20 @@ class WiredBoard(EmptyBoard):
             if marks:
                 cpu.unmark(marks)
 
+    def _catch_up(self) -> None:
+        """The serial port is brought up to the end of the last instruction: so must be what is on its pins."""
+        end_tick = self.cpu.cycles * CYCLE_TICKS
+        if self.drives_rxd:
+            self.sync(end_tick - 1)
+        while self.output_tick < end_tick:
+            self.sync(self.output_tick)
+
     def _run_pieces(self, until_cycle: int) -> int:
-        """In pieces that end at the next event of a part that may reach a port pin."""
+        """In pieces that end at the next event that may reach a port pin, or that is an edge of an output."""
         cpu = self.cpu
         faults = self.fault_count
         while cpu.cycles < until_cycle:
-            due = self.nets.reach_tick
+            due = self._due()
             due_cycle = self._cycle_of(due)
             self.horizon = due
             if self._is_due(due, due_cycle) or self._is_before_write(due_cycle):
@@ -161,9 +190,16 @@ class WiredBoard(EmptyBoard):
                 return reason
         return 0
 
+    def _due(self) -> int:
+        """The next event that bounds the CPU."""
+        due = self.nets.reach_tick
+        return self.output_tick if self.output_tick // CYCLE_TICKS < self._cycle_of(due) else due
+
     def _cycle_of(self, due: int) -> int:
-        """The first cycle whose S5P2 is not before an event; RXD is looked at between cycles, too."""
-        return (due if self.drives_rxd else due + 2) // CYCLE_TICKS
+        """The first cycle whose S5P2 is not before an event; RXD is looked at between cycles, too, and an edge of an
+        output comes before what the next instruction writes.
+        """
+        return (due if self.drives_rxd or due == self.output_tick else due + 2) // CYCLE_TICKS
 
     def _is_due(self, due: int, due_cycle: int) -> bool:
         """Whether an event is to be handled before the next instruction; a MOVX moves the pins of its bus before it."""
@@ -183,21 +219,75 @@ class WiredBoard(EmptyBoard):
 
     def _step(self) -> None:
         cpu = self.cpu
-        while self._is_before_write(self._cycle_of(self.nets.reach_tick)):
-            self.sync(self.nets.reach_tick)
+        while self._is_before_write(self._cycle_of(self._due())):
+            self.sync(self._due())
         cpu.begin_run()
         cpu.go_on(cpu.cycles + 1)
-        if self.drives_rxd:
-            self.sync(cpu.cycles * CYCLE_TICKS - 1)
+        self._catch_up()
         cpu.end_run()
 
     def sync(self, tick: int) -> None:
-        """Does all that parts have to do by themselves up to and including `tick`."""
+        """Does all that parts and outputs have to do by themselves up to and including `tick`."""
         nets = self.nets
-        while nets.next_tick <= tick:
-            now = nets.next_tick
-            nets.due(now)
+        while nets.next_tick <= tick or self.output_tick <= tick:
+            now = min(nets.next_tick, self.output_tick)
+            if nets.next_tick == now:
+                nets.due(now)
+            if self.output_tick == now:
+                self._output_due(now)
             self._push(now)
+
+    # Outputs that do not come from latches
+
+    def _output_due(self, tick: int) -> None:
+        peripherals = self.cpu.peripherals
+        self.output_put = tick
+        for output in range(3):
+            if self.output_ticks[output] <= tick:
+                self._put_output(output, peripherals.output_at(output, tick), tick)
+                self.output_ticks[output] = peripherals.output_after(output, tick)
+        self.output_tick = min(self.output_ticks[0], self.output_ticks[1], self.output_ticks[2])
+
+    def _put_output(self, output: int, level: int, tick: int) -> None:
+        """The pin is the AND of this level and the latch (4316E section 2.5)."""
+        nets, port, mask = self.nets, _OUTPUT_PORT[output], _OUTPUT_MASK[output]
+        self.output_levels[port] = self.output_levels[port] & ~mask | (mask if level else 0)
+        levels = nets.latches[port] & ~mask
+        levels |= self.cpu.peripherals.ports.latches[port] & self.output_levels[port] & mask
+        if levels != nets.latches[port]:
+            nets.write_port(port, levels, tick)
+
+    def outputs_changed(self, tick: int) -> int:
+        """All edges below `tick` have been put, and some beyond it where the change comes from pins sampled then."""
+        peripherals = self.cpu.peripherals
+        before = max(tick - 1, self.output_put)
+        if (
+            tick > self.cpu.cycles * CYCLE_TICKS
+        ):  # where that changes something, looks again when the CPU is there
+            for output in range(3):
+                foreseen = self.output_ticks[output]
+                if self.outputs >> output & 1 and peripherals.output_after(output, before) != foreseen:
+                    self.output_ticks[output] = min(foreseen, tick)
+                    self.output_tick = min(self.output_tick, tick)
+        else:
+            self._before(tick)
+            for output in range(3):
+                if self.outputs >> output & 1:
+                    self._put_output(output, peripherals.output_at(output, before), tick)
+            self._foresee(before)
+            self._push(tick)
+        if self.output_tick != NEVER_TICK and self.output_tick < self.horizon + CYCLE_TICKS:
+            self.horizon = min(self.horizon, self.output_tick)
+            self.cpu.replan()
+        return 0
+
+    def _foresee(self, tick: int) -> None:
+        """The next edges later than `tick`."""
+        self.output_tick = NEVER_TICK
+        for output in range(3):
+            if self.outputs >> output & 1:
+                self.output_ticks[output] = self.cpu.peripherals.output_after(output, tick)
+                self.output_tick = min(self.output_tick, self.output_ticks[output])
 
     def _push(self, tick: int) -> None:
         """The tick is over: to the CPU what has changed on its pins, and when it has to look up for the parts."""
@@ -236,7 +326,7 @@ class WiredBoard(EmptyBoard):
             self.starved.append(FirmwareFault(FaultKind(kind), tick, pc, self.image.symbols.name_at(pc)))
 
     def port_written(self, port: int, latch: int, tick: int) -> None:
-        self._put_on_port(port, latch, tick)
+        self._put_on_port(port, latch & self.output_levels[port], tick)
 
     def _put_on_port(self, port: int, latch: int, tick: int) -> None:
         """The levels that the chip drives a port with."""
@@ -250,7 +340,7 @@ class WiredBoard(EmptyBoard):
 
     def _before(self, tick: int) -> None:
         """What parts do before the CPU writes at `tick`; contention on that tick is judged after the write."""
-        if self.nets.next_tick <= tick:
+        if self.nets.next_tick <= tick or self.output_tick < tick:
             self.sync(tick - 1)
             if self.nets.next_tick == tick:
                 self.nets.due(tick)
@@ -431,8 +521,15 @@ class WiredBoard(EmptyBoard):
         for part in self.parts:
             if part.next_tick < earliest_tick:
                 raise ValueError(f"part {part.name} has its next event at tick {part.next_tick}")
+        self.output_put = self.cpu.cycles * CYCLE_TICKS - 1
+        for output in range(3):
+            port, mask = _OUTPUT_PORT[output], _OUTPUT_MASK[output]
+            if self.outputs >> output & 1:
+                level = self.cpu.peripherals.output_at(output, self.output_put)
+                self.output_levels[port] = self.output_levels[port] & ~mask | (mask if level else 0)
+        self._foresee(self.output_put)
         for port in range(4):
-            self.nets.latches[port] = self.cpu.peripherals.ports.latches[port]
+            self.nets.latches[port] = self.cpu.peripherals.ports.latches[port] & self.output_levels[port]
         self.nets.powered = self.powered
         self.nets.restart()
         for index in range(self.latch_count):

@@ -10,4 +10,5 @@ cdef class Bus:
     cpdef fault(self, int kind, int pc, long long tick)
     cpdef receiver_on(self, long long tick)
     cpdef byte_received(self, int value, int stop, long long tick)
+    cpdef int outputs_changed(self, long long tick) except -1
     cpdef byte_sent(self, int value, long long tick)

@@ -54,5 +54,11 @@ class Bus:
     def byte_received(self, value: int, stop: int, tick: int) -> None:
         """The serial port set RI at `tick` for the character `value`; `stop`: bit RB8, the stop bit in mode 1."""
 
+    def outputs_changed(self, tick: int) -> int:
+        """With `Peripherals.listened`: from `tick` on TXD, the data of mode 0 or the clock of timer 2 may go otherwise
+        than was foreseen. A tick beyond the CPU's: pins were sampled. Returns 0.
+        """
+        return 0
+
     def byte_sent(self, value: int, tick: int) -> None:
         """The serial port set TI for the character `value` (its 8 data bits)."""

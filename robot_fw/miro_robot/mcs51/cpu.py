@@ -19,7 +19,7 @@ from miro_robot.mcs51.chip import ASLEEP, BREAKPOINT, REACHED, REPLAN, STOPPED, 
 
 __all__ = ["ASLEEP", "BREAKPOINT", "REACHED", "REPLAN", "STOPPED", "WIRE_FULL", "Cpu", "on_load"]
 
-_REACHED, _BREAKPOINT, _WIRE_FULL, _ASLEEP = REACHED, BREAKPOINT, WIRE_FULL, ASLEEP
+_REACHED, _BREAKPOINT, _WIRE_FULL, _ASLEEP, _REPLAN = REACHED, BREAKPOINT, WIRE_FULL, ASLEEP, REPLAN
 _MARK = 0x1000  # line that ends a run before its instruction
 _UNDEFINED_OPCODE = int(FaultKind.UNDEFINED_OPCODE)
 _STACK_OVERFLOW = int(FaultKind.STACK_OVERFLOW)
@@ -105,7 +105,8 @@ class Cpu(Chip):
             self.stop = _WIRE_FULL
             return 1
         if now >= self.next_event and self._attend(now):
-            return 1 if self.stop else 0
+            # Replanned while pins were sampled: ends at the next boundary, for PC may be at a vector now.
+            return 1 if self.stop not in (0, _REPLAN) else 0
         event = self._next_look()
         if (self.idle or self.powered_down) and now < event:
             if not self._taken_over():  # nor will it be at a mark

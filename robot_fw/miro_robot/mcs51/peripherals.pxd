@@ -29,7 +29,7 @@ cdef class Peripherals:
     cdef public int frozen
     cdef int pulsed
     cdef public long long written
-    cdef public int has_timer2, observed
+    cdef public int has_timer2, observed, listened
     cdef readonly long long now
     cdef long long timer_wait, serial_wait, quiet
     cdef int timer1_free
@@ -60,6 +60,10 @@ cdef class Peripherals:
     cdef inline void sample_latches(self, long long cycle) noexcept
     cdef int _inputs_changed(self, int changed1, int changed3, long long cycle) except -1
     cpdef int pin_levels(self, int port, long long cycle) except -1
+    @cython.locals(shifted=int)
+    cpdef int output_at(self, int output, long long tick) noexcept
+    @cython.locals(edge='long long')
+    cpdef long long output_after(self, int output, long long tick) noexcept
     cpdef int read(self, int address, long long cycle) except -1
     cdef int _read_rarely(self, int address, long long cycle) noexcept
     @cython.locals(timers=bint)

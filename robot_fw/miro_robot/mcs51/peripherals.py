@@ -66,8 +66,9 @@ class Peripherals:
         "serial_wait",
         "quiet",
         "timer1_free",
+        "listened",
     )
-    """All but the first follow from the registers."""
+    """All but the first and the last, which is wiring, follow from the registers."""
 
     def __init__(self, bus: Bus) -> None:
         self.bus = bus
@@ -88,6 +89,7 @@ class Peripherals:
         self.timer1_free = 0  # it clocks no direction of the serial port: writing timers does not touch that
         self.has_timer2 = 1
         self.observed = 0  # 1 while a register is read by no instruction
+        self.listened = 0  # the bus wants to know of `outputs_changed`
         self.p3_reads = 0  # how often the pins of P3 were read: whether software listens on RXD itself
         self.look_again()
 
@@ -104,7 +106,7 @@ class Peripherals:
         self.timers.clear(cycle)
         self.timer2.clear(cycle)
         self.uart.clear(cycle)
-        self.shift.flag = 0
+        self.shift.abort(12 * cycle)
         self.timers.set_gates(self.external.levels)
         self.timer2.up = (self.p1 >> 1) & 1
         self.look_again()
@@ -114,6 +116,8 @@ class Peripherals:
         """Nothing happens from `cycle` on, until `clear`."""
         self.settle(cycle)
         self.frozen = 1
+        if self.listened:
+            self.bus.outputs_changed(12 * cycle)
 
     # Time
 
@@ -231,6 +235,8 @@ class Peripherals:
         """Works out the serial port's 16x ticks again, after anything that they depend on has changed."""
         self.settle(self.now)
         self._set_serial_clock()
+        if self.listened:
+            self.bus.outputs_changed(12 * self.now)
 
     def _set_serial_clock(self) -> None:
         """With all parts at the same cycle."""
@@ -345,6 +351,29 @@ class Peripherals:
             levels &= 0xFE | self.timer2.clock_out
         return levels
 
+    def output_at(self, output: int, tick: int) -> int:
+        """TXD (0), the data of mode 0 on RXD (1) or the clock of timer 2 on T2 (2) at `tick`, latches left out.
+
+        If nothing changes until then; not before what has been done. TXD of a port that a counter of pins clocks is 1.
+        """
+        if self.frozen:
+            tick = 12 * self.now - 1
+        if output == 2:
+            return self.timer2.out_at(tick)
+        shifted = self.shift.levels_at(tick)
+        return shifted & 1 if output else shifted >> 1 & (1 if self.pulsed else self.uart.tx_at(tick))
+
+    def output_after(self, output: int, tick: int) -> int:
+        """A tick later than that before which an output does not change, if nothing else does."""
+        if self.frozen:
+            return NEVER_TICK
+        if output == 2:
+            return self.timer2.out_after(tick)
+        edge = self.shift.edge_after(tick)
+        if output == 0:
+            edge = min(edge, NEVER_TICK if self.pulsed else self.uart.tx_after(tick))
+        return edge
+
     # Registers
 
     def read(self, address: int, cycle: int) -> int:
@@ -447,7 +476,7 @@ class Peripherals:
         """A register of the serial port or of timer 2, with both settled."""
         if address == _SCON:
             if (value ^ self.uart.scon) & 0xC0:
-                self.shift.flag = 0
+                self.shift.abort(12 * cycle)
             self.uart.write_scon(value, cycle)
             if self.uart.mode() == 0:
                 self.shift.begin_reception(cycle)

@@ -21,4 +21,9 @@ cdef class Shift:
     cdef int sync(self, long long tick) except -1
     cdef int _bit(self, long long tick) except -1
     cdef int _finish(self) except -1
+    cdef int abort(self, long long tick) except -1
+    @cython.locals(since='long long', clock=int)
+    cpdef int levels_at(self, long long tick) noexcept
+    @cython.locals(first='long long', phase='long long')
+    cpdef long long edge_after(self, long long tick) noexcept
     cpdef long long flag_tick(self) noexcept

@@ -85,6 +85,33 @@ class Shift:
         if flag == _TI:
             self.uart.bus.byte_sent(self.value, tick)
 
+    def abort(self, tick: int) -> None:
+        """Reset, or another mode, at `tick`: a byte on its way is lost."""
+        self.flag = 0
+        self.data.append(tick, 1)
+
+    def levels_at(self, tick: int) -> int:
+        """Shift clock (bit 1) and data (bit 0) that the register drives at `tick`, if nothing changes until then."""
+        since = tick - 12 * (self.cycle - self.number)
+        if self.flag == 0 or since >= 96:
+            return 3
+        if since < 0:  # a byte that another one cut off has left its level
+            return 2 | self.data.level_at(tick)
+        clock = 0 if _CLOCK_FALLS <= since % 12 < _CLOCK_RISES else 2
+        return clock | (self.value >> since // 12 & 1 if self.flag == _TI else 1)
+
+    def edge_after(self, tick: int) -> int:
+        """A tick later than that before which neither changes, NEVER_TICK if they will not."""
+        first = 12 * (self.cycle - self.number)
+        if self.flag == 0 or tick >= first + 96:
+            return NEVER_TICK
+        if tick < first:
+            return first
+        phase = (tick - first) % 12
+        if phase < _CLOCK_RISES:
+            return tick - phase + (_CLOCK_FALLS if phase < _CLOCK_FALLS else _CLOCK_RISES)
+        return tick - phase + 12
+
     def flag_tick(self) -> int:
         """Tick at which TI or RI goes up, NEVER_TICK when idle."""
         return 12 * (self.cycle + 8 - self.number) if self.flag else NEVER_TICK

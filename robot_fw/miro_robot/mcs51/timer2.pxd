@@ -30,6 +30,10 @@ cdef class Timer2:
     cdef void _overflowed(self, long long overflows, long long cycle) noexcept
     cpdef long long next_flag(self) noexcept
     cpdef long long next_overflow_tick(self) noexcept
+    @cython.locals(first='long long')
+    cpdef int out_at(self, long long tick) noexcept
+    @cython.locals(first='long long', period='long long')
+    cpdef long long out_after(self, long long tick) noexcept
     cdef int counts_pin(self) noexcept
     @cython.locals(waiting=int)
     cdef long long next_pin_overflow(self) noexcept

@@ -155,6 +155,27 @@ class Timer2:
         # Two ticks a state; the overflow shows with the last of them (U2).
         return 12 * self.synced + 2 * self.left() - 1
 
+    def out_at(self, tick: int) -> int:
+        """The clock output at `tick`, if nothing changes until then; 1 while there is none. It toggles on the tick with
+        which an overflow shows (U2).
+        """
+        if not self.drives_pin():
+            return 1
+        first = self.next_overflow_tick()
+        return (
+            self.clock_out
+            if tick < first
+            else self.clock_out ^ (1 - ((tick - first) // (2 * self.span()) & 1))
+        )
+
+    def out_after(self, tick: int) -> int:
+        """The tick of its first edge later than that, NEVER_TICK if there will be none."""
+        first = self.next_overflow_tick() if self.drives_pin() else NEVER_TICK
+        if tick < first:
+            return first
+        period = 2 * self.span()
+        return first + ((tick - first) // period + 1) * period
+
     def counts_pin(self) -> int:
         return 1 if self.control & _TR2 and self.control & _C_T2 else 0
 

@@ -18,10 +18,11 @@ cdef class Uart:
     cdef readonly int latch, scon
     cdef public int received
     cdef readonly long long tx_next, tx_period
-    cdef int tx_phase, tx_bits, tx_left, tx_value
+    cdef int tx_phase, tx_bits, tx_value
+    cdef readonly int tx_left
     cdef long long tx_delay
     cdef public int tx_level
-    cdef long long tx_edge
+    cdef readonly long long tx_edge
     cdef int tx_coming
     cdef readonly long long rx_next, rx_period
     cdef int rx_count, rx_last, rx_votes, rx_bits
@@ -43,6 +44,11 @@ cdef class Uart:
     cdef int _transmit(self, long long tick) except -1
     cdef int _edge(self) except -1
     cpdef long long ti_tick(self) noexcept
+    @cython.locals(level=int, edge='long long', number=int)
+    cpdef int tx_at(self, long long tick) noexcept
+    @cython.locals(level=int, edge='long long', number=int)
+    cpdef long long tx_after(self, long long tick) noexcept
+    cdef inline long long _first_bit(self) noexcept
     cdef void _receive(self, long long tick) noexcept
     cdef void _search(self, long long tick) noexcept
     cdef void _bit(self, long long tick) noexcept

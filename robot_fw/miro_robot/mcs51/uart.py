@@ -218,10 +218,35 @@ class Uart:
         """Tick at which TI goes up if nothing changes, NEVER_TICK if nothing is being sent."""
         if self.tx_left == 0:
             return self.tx_edge
+        return self._first_bit() + (self.tx_left - 1) * _ROLLOVERS * self.tx_period
+
+    def tx_at(self, tick: int) -> int:
+        """What the transmitter puts on TXD at `tick`, if nothing changes until then; not before what is done."""
+        level = self.tx_coming if self.tx_edge <= tick else self.tx_level
+        edge = self._first_bit()
+        for number in range(self.tx_left):
+            if edge > tick:
+                break
+            level = self.tx_bits >> number & 1
+            edge += _ROLLOVERS * self.tx_period
+        return level
+
+    def tx_after(self, tick: int) -> int:
+        """The tick of its first edge later than that, NEVER_TICK without one."""
+        level = self.tx_at(tick)
+        if tick < self.tx_edge < NEVER_TICK and self.tx_coming != level:
+            return self.tx_edge
+        edge = self._first_bit()
+        for number in range(self.tx_left):
+            if edge > tick and self.tx_bits >> number & 1 != level:
+                return edge if edge < _STOPPED else NEVER_TICK
+            edge += _ROLLOVERS * self.tx_period
+        return NEVER_TICK
+
+    def _first_bit(self) -> int:
+        """When the next bit appears that has no rollover yet."""
         rollover = self.tx_next + (_ROLLOVERS - 1 - self.tx_phase) * self.tx_period
-        last = rollover + (self.tx_left - 1) * _ROLLOVERS * self.tx_period
-        delay = self.tx_delay if self.tx_delay else 12 - rollover % 12
-        return last + delay
+        return rollover + (self.tx_delay if self.tx_delay else 12 - rollover % 12)
 
     # Receiver
 
