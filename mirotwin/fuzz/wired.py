@@ -143,6 +143,7 @@ class WiredMachine:
         board.log.cut(0)
         self.to_pc.clear()
         self.reset_tick = -1
+        self.device.put_stopped = 0
         if isinstance(board, WiredBoard):
             board.starved.clear()
         if self.device.changes is not None:

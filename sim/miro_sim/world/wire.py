@@ -31,14 +31,15 @@ _STOP = CHARACTER_BITS - 1
 
 class BoardAlone(Device):
     """A board on a wire. `parts`: the keys of those that are on it, by name. `reads`: part and key of each value by
-    its path. `changes`: for who watches it.
+    its path. `changes`: for who watches it. `put_stopped`: whether a put has stopped the run; its next piece tells.
     """
 
-    NOT_STATE = ("sample_ticks", "parts", "reads", "changes")
+    NOT_STATE = ("sample_ticks", "put_stopped", "parts", "reads", "changes")
 
     def __init__(self, board: EmptyBoard, network: int, image: Image) -> None:
         Device.__init__(self, board, network, 0, image)
         self.board: EmptyBoard
+        self.put_stopped = 0
         self.sample_ticks = board.spec.crystal_hz // 1000
         self.parts = {part.name: part.keys for part in board.parts} if isinstance(board, WiredBoard) else {}
         self.reads = {f"{name}.{key}": (name, key) for name, keys in self.parts.items() for key in keys.READS}
@@ -46,9 +47,9 @@ class BoardAlone(Device):
 
     def run(self, tick: int) -> int:
         changes = self.changes
-        if changes is None or not changes.now:
+        stopped, self.put_stopped = self.put_stopped, 0
+        if not stopped and (changes is None or not changes.now):
             return Device.run(self, tick)
-        stopped = 0
         while not stopped and changes.look_tick <= tick:
             stopped = Device.run(self, changes.look_tick)
             if not stopped:
@@ -66,7 +67,7 @@ class BoardAlone(Device):
 
     def put(self, path: str, value: PutValue, tick: int) -> None:
         part, key, taken = checked_put(self.parts, path, value)
-        self._wired.put(part, key, taken, tick)
+        self.put_stopped = self._wired.put(part, key, taken, tick) or self.put_stopped
         if self.changes is not None:
             self.changes.look(tick)
 

@@ -198,3 +198,31 @@ def test_loading_a_world_forgets_what_was_watched_before():
     world.load(saved)
     assert world.run_until(wait.Edge(pin="BLINK"), within=END) == first
     assert TABLE["nets"]["BLINK"] == "P1.3"
+
+
+SHORTED = {
+    "crystal_hz": CRYSTAL_HZ,
+    "pull_downs": ["P1.3"],
+    "parts": {"key": {"part": "button", "to": "vcc", "pins": {"pin": "P1.3"}}},
+}
+"""Pressed, the key shorts the pin that the program holds low."""
+
+
+@pytest.mark.parametrize("stop_on_fault", [True, False])
+def test_a_fault_that_a_put_makes_stops_the_run_on_its_tick(stop_on_fault):
+    world = board_world("CLR P1.3\nSJMP $", SHORTED, stop_on_fault=stop_on_fault)
+    tick = world.do(Put(50_000, 0, 0, "key.pressed", True))
+    world.run_to(100_000)
+    (fault,) = world.devices[0].board.faults
+    assert tick == 50_000 <= fault.tick < tick + 24, "between two instructions"
+    assert world.stopped is stop_on_fault
+    assert (world.devices[0].board.cpu.cycles * 12 == fault.tick) is stop_on_fault
+
+
+def test_a_wait_ends_where_a_put_makes_a_fault():
+    world = board_world("CLR P1.3\nSJMP $", SHORTED)
+    world.do(Put(50_000, 0, 0, "key.pressed", True))
+    with pytest.raises(WaitExpired):
+        world.run_until(wait.Level(pin="P1.3", level=1), within=200_000)
+    assert world.stopped
+    assert world.devices[0].board.cpu.cycles * 12 < 50_024
