@@ -32,7 +32,7 @@ from mirotwin.recording.theory.figures import (
     Theory,
 )
 from mirotwin.recording.track import Tracks
-from mirotwin.runs.board_summary import BoardSummary, SerialFigures
+from mirotwin.runs.board_summary import AnySummary, BoardSummary, SerialFigures
 from mirotwin.runs.summary import FirmwareCounts, LinkCounts, Summary, Tracking, VisionCounts, tracking_of
 
 TEXTS = ("verdict", "error", "failure", "digest")
@@ -69,7 +69,7 @@ def _kinds(struct: type) -> Iterator[tuple[str, type]]:
 class _Run:
     """The source of the columns of one run."""
 
-    def __init__(self, summary: Summary | BoardSummary, tracks: Tracks) -> None:
+    def __init__(self, summary: AnySummary, tracks: Tracks) -> None:
         self.summary: Any = summary
         self.first = next(iter(tracks.robots.values()), None)
 
@@ -118,9 +118,7 @@ BOARD_COLUMNS: Mapping[str, _Column] = {**_SIMULATED, **_of_parts(_BOARD_PARTS)}
 BOARD_FIGURES: Mapping[str, type] = {name: kind for name, (kind, _) in BOARD_COLUMNS.items()}
 
 
-def figures_of(
-    summary: Summary | BoardSummary, tracks: Tracks, values: Mapping[str, type] = {}
-) -> dict[str, Any]:
+def figures_of(summary: AnySummary, tracks: Tracks, values: Mapping[str, type] = {}) -> dict[str, Any]:
     """The figures of one run, with those of the `values` of parts that it has. Raises ValueError for another kind."""
     run, columns = _Run(summary, tracks), COLUMNS if isinstance(summary, Summary) else BOARD_COLUMNS
     found = {name: value(run) for name, (_, value) in columns.items()}

@@ -19,7 +19,7 @@ from mirotwin.report.page.frames import Extras, extras_of
 from mirotwin.report.page.port_page import port_page
 from mirotwin.report.page.run_page import Material, run_page
 from mirotwin.report.page.watched_run import WatchedRun, run_again
-from mirotwin.runs.board_summary import BoardSummary
+from mirotwin.runs.board_summary import AnySummary, BoardSummary
 from mirotwin.runs.job import Job, load_job
 from mirotwin.runs.summary import Summary
 from mirotwin.shell.command import Argument, Option, Options, command_of
@@ -32,8 +32,6 @@ from mirotwin.shell.times import Time, window
 from mirotwin.verify.cases.artifacts import CASES, PAGE, REPORT
 from mirotwin.verify.cases.replay_line import replay_line
 from mirotwin.verify.steps.reading import steps_of
-
-AnySummary = Summary | BoardSummary
 
 SUMMARIES = ("summary.json", "summary.part.json")
 PARQUET = b"PAR1"

@@ -7,44 +7,21 @@ from pathlib import Path
 from rich.table import Table
 
 from miro_exact.bad_input import amount
+from mirotwin.run.run_table import begun_table, ended_table
 from mirotwin.runs.board_summary import BoardSummary, SerialCounts
-from mirotwin.runs.result import expectations_text
-from mirotwin.shell.console import facts_table
 
 LONGEST_TEXT = 100
 """Of a value in the table: rows of a display are shorter."""
 
 
 def board_table(summary: BoardSummary, serial: SerialCounts, image: str, folder: Path) -> Table:
-    firmware, table = summary.firmware, facts_table()
     mhz = f"{summary.crystal_hz / 1e6:.6f}".rstrip("0").rstrip(".")
-    table.add_row("scenario", f"{summary.scenario}, seed {summary.seed}")
-    table.add_row("board", f"{summary.board}: {summary.chip}, {mhz} MHz")
-    if summary.set:
-        table.add_row("set", " ".join(summary.set))
-    began = f"{summary.resumed_s:.2f} s to " if summary.resumed_s is not None else ""
-    table.add_row(
-        "time",
-        f"{began}{summary.simulated_s:.2f} s in {summary.wall_s:.2f} s ({summary.realtime_factor:.1f} x real time, "
-        f"engine {summary.engine})",
-    )
-    if summary.resumed_s is not None:
-        table.add_row(
-            "resumed", f"at {summary.resumed_s:.2f} s: serial port and checks from there; firmware from 0 s"
-        )
+    board = ("board", f"{summary.board}: {summary.chip}, {mhz} MHz")
+    table = begun_table(summary, "serial port and checks from there; firmware from 0 s", board)
     table.add_row("serial port", _serial_text(summary, serial))
     for part, values in _by_part(summary).items():
         table.add_row(part, ", ".join(values))
-    idle = 100.0 * firmware.idle_cycles / firmware.machine_cycles if firmware.machine_cycles else 0.0
-    table.add_row(
-        "firmware",
-        f"{image}: {firmware.instructions} instructions, {firmware.machine_cycles} cycles ({idle:.0f} % idle), "
-        f"{amount(firmware.faults, 'fault')}",
-    )
-    table.add_row("expected", expectations_text(summary.expectations))
-    table.add_row("digest", summary.digest)
-    table.add_row("files", str(folder))
-    return table
+    return ended_table(table, summary, folder, f"{image}: ")
 
 
 def _serial_text(summary: BoardSummary, serial: SerialCounts) -> str:

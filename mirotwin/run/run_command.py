@@ -14,8 +14,9 @@ from miro_exact.bad_input import BadInput
 from miro_exact.clock import TICKS_PER_SECOND
 from miro_sim.scenario.board_scenario import BoardText, load_any
 from mirotwin.recording.recorder import source_of
-from mirotwin.run.run_files import AnySummary, RunFiles, Stops, digest_in
+from mirotwin.run.run_files import RunFiles, Stops, digest_in
 from mirotwin.run.run_options import RunOptions
+from mirotwin.runs.board_summary import AnySummary
 from mirotwin.runs.run import Run
 from mirotwin.runs.spec import RunSpec
 from mirotwin.runs.summary import Summary

@@ -29,10 +29,10 @@ from miro_sim.scenario.board import BoardScenario
 from miro_sim.world.world import World
 from mirotwin.recording.recorder import Recorder, RunSource
 from mirotwin.recording.track import Tracks
-from mirotwin.runs.board_summary import BoardSummary, SerialCounts, summarise_board
+from mirotwin.runs.board_summary import AnySummary, SerialCounts, summarise_board
 from mirotwin.runs.learnt import learnt_calibrations, learnt_wheels
 from mirotwin.runs.run import Run
-from mirotwin.runs.summary import LiveFigures, StepResults, Summary, summarise, to_json
+from mirotwin.runs.summary import LiveFigures, StepResults, summarise, to_json
 from mirotwin.shell.held_signals import Hold
 from mirotwin.shell.outputs import KEPT, RECORDING, OutputFolder, part_name
 from mirotwin.shell.progress import ProgressBar
@@ -43,7 +43,6 @@ if TYPE_CHECKING:
     from mirotwin.camera.view import View
     from mirotwin.verify.steps.player import Player
 
-AnySummary = Summary | BoardSummary
 SUMMARY = "summary.json"
 FIGURE = "figure.svg"
 WORLD_SUFFIX = ".world"

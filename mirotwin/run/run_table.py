@@ -9,6 +9,7 @@ from rich.table import Table
 from miro_exact.bad_input import amount
 from mirotwin.recording.theory.figures import theory_text
 from mirotwin.recording.track import Tracks
+from mirotwin.runs.board_summary import AnySummary
 from mirotwin.runs.learnt import calibration_text, wheels_text
 from mirotwin.runs.result import expectations_text
 from mirotwin.runs.summary import Summary, off_pitch_text, rms_name, settling_text, vision_text
@@ -16,20 +17,8 @@ from mirotwin.shell.console import facts_table
 
 
 def table_of(summary: Summary, tracks: Tracks, folder: Path) -> Table:
-    tracking, link, firmware = summary.tracking, summary.link, summary.firmware
-    table = facts_table()
-    table.add_row("scenario", f"{summary.scenario}, seed {summary.seed}")
-    if summary.set:
-        table.add_row("set", " ".join(summary.set))
-    began = f"{summary.resumed_s:.2f} s to " if summary.resumed_s is not None else ""
-    table.add_row(
-        "time",
-        f"{began}{summary.simulated_s:.2f} s in {summary.wall_s:.2f} s ({summary.realtime_factor:.1f} x real time, "
-        f"engine {summary.engine})",
-    )
-    if summary.resumed_s is not None:
-        covered = "errors, theory and checks from there; camera, link and firmware from 0 s"
-        table.add_row("resumed", f"at {summary.resumed_s:.2f} s: {covered}")
+    tracking, link = summary.tracking, summary.link
+    table = begun_table(summary, "errors, theory and checks from there; camera, link and firmware from 0 s")
     if tracking.rms_position_cm is not None:
         errors = next(iter(tracks.robots.values())).errors
         table.add_row(
@@ -55,10 +44,35 @@ def table_of(summary: Summary, tracks: Tracks, folder: Path) -> Table:
         f"{_known(link.frames_rejected)} rejected, {_known(link.frames_stale)} stale; "
         f"{amount(link.bit_errors, 'bit error')}",
     )
+    return ended_table(table, summary, folder)
+
+
+def begun_table(summary: AnySummary, covered: str, *more: tuple[str, str]) -> Table:
+    """The first rows, of robots and of boards. `covered`: what of a resumed run the figures cover. `more`: a board."""
+    table = facts_table()
+    table.add_row("scenario", f"{summary.scenario}, seed {summary.seed}")
+    for row in more:
+        table.add_row(*row)
+    if summary.set:
+        table.add_row("set", " ".join(summary.set))
+    began = f"{summary.resumed_s:.2f} s to " if summary.resumed_s is not None else ""
+    table.add_row(
+        "time",
+        f"{began}{summary.simulated_s:.2f} s in {summary.wall_s:.2f} s ({summary.realtime_factor:.1f} x real time, "
+        f"engine {summary.engine})",
+    )
+    if summary.resumed_s is not None:
+        table.add_row("resumed", f"at {summary.resumed_s:.2f} s: {covered}")
+    return table
+
+
+def ended_table(table: Table, summary: AnySummary, folder: Path, image: str = "") -> Table:
+    """The same with the last rows."""
+    firmware = summary.firmware
     idle = 100.0 * firmware.idle_cycles / firmware.machine_cycles if firmware.machine_cycles else 0.0
     table.add_row(
         "firmware",
-        f"{firmware.instructions} instructions, {firmware.machine_cycles} cycles ({idle:.0f} % idle), "
+        f"{image}{firmware.instructions} instructions, {firmware.machine_cycles} cycles ({idle:.0f} % idle), "
         f"{amount(firmware.faults, 'fault')}",
     )
     table.add_row("expected", expectations_text(summary.expectations))

@@ -10,7 +10,7 @@ import msgspec
 from miro_exact import engine
 from miro_protocol.transmission import DOWN
 from miro_sim.periods import Period
-from mirotwin.runs.summary import FirmwareCounts, LiveFigures, StepResults
+from mirotwin.runs.summary import FirmwareCounts, LiveFigures, StepResults, Summary
 from mirotwin.verify.checks.interface import Expectation
 
 if TYPE_CHECKING:
@@ -69,6 +69,9 @@ class BoardSummary(msgspec.Struct, frozen=True, omit_defaults=True):
     expectations: tuple[Expectation, ...] = ()
     live: LiveFigures | None = None
     steps: StepResults | None = None
+
+
+AnySummary = Summary | BoardSummary
 
 
 def summarise_board(world: World, serial: SerialCounts, wall_s: float, begin_tick: int = 0) -> BoardSummary:

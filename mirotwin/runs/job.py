@@ -23,7 +23,7 @@ from miro_robot.image import FLASH_BYTES, SPACE_BYTES, Image, Symbol, Symbols, p
 from miro_sim.periods import Period
 from miro_sim.radio.params import Radio
 from miro_sim.scenario.board import BoardScenario
-from miro_sim.scenario.board_scenario import any_of_text, board_of_tables
+from miro_sim.scenario.board_scenario import AnyText, any_of_text, board_of_tables
 from miro_sim.scenario.errors import ScenarioError
 from miro_sim.scenario.file import builtin_names, changed, load, of_table
 from miro_sim.scenario.keys import MAX_NETWORKS, NetworkSpec, Scenario
@@ -428,7 +428,7 @@ def _job_of_stream(
         return _job_of_board(given, path, settings, image, seed)
     header, sent = given.header, given.script()
     keys = [*in_text(header.set or {}), *in_text({"expect": header.expect or {}})]
-    script, own = script_of_stream(sent), header.seed or 0
+    script = script_of_stream(sent)
     with BadInput.at(path):
         written = scenario_of_stream(sent, header)
         text = changed(written, "", [*keys, *settings])
@@ -438,16 +438,16 @@ def _job_of_stream(
         if settings:
             as_written = changed(written, "", keys)
             expectations_in(as_written)
-    other = header.firmware_sha256 not in (None, image.sha256) or seed not in (None, own)
-    other = other or scenario != as_written.scenario
-    spec = RunSpec(
-        scenario=scenario,
-        image=image,
-        seed=own if seed is None else seed,
-        script=script,
-        expected=expected,
-        origin=path,
-    )
+    spec = RunSpec(scenario=scenario, image=image, script=script, expected=expected, origin=path)
+    return _job_of_spec(spec, header, seed, as_written)
+
+
+def _job_of_spec(spec: RunSpec, header: Header, seed: int | None, as_written: AnyText) -> Job:
+    """With the seed, and whether it is run otherwise than the file says."""
+    own = header.seed or 0
+    other = header.firmware_sha256 not in (None, spec.image.sha256) or seed not in (None, own)
+    other = other or spec.scenario != as_written.scenario
+    spec = replace(spec, seed=own if seed is None else seed)
     return Job(spec=spec, case=Case(header.verdict or "", header.end_tick or 0, other))
 
 
@@ -455,7 +455,7 @@ def _job_of_board(
     given: stream.StreamFile, path: str, settings: Sequence[str], image: Image, seed: int | None
 ) -> Job:
     """Of a board that the header names, or holds in its scenario."""
-    header, script, own = given.header, script_of_stream(given.script()), given.header.seed or 0
+    header, script = given.header, script_of_stream(given.script())
     keys = [*in_text(header.set or {}), *in_text({"expect": header.expect or {}})]
     with BadInput.at(path):
         tables = tables_of_stream(given, script)
@@ -464,17 +464,8 @@ def _job_of_board(
     scenario = text.scenario
     check_crystal(scenario, header.crystal_hz or TICKS_PER_SECOND, path)
     check_board_script(script, path, scenario)
-    other = header.firmware_sha256 not in (None, image.sha256) or seed not in (None, own)
-    other = other or scenario != as_written.scenario
-    spec = RunSpec(
-        scenario=scenario,
-        image=image,
-        seed=own if seed is None else seed,
-        script=script,
-        expected=expected,
-        origin=path,
-    )
-    return Job(spec=spec, case=Case(header.verdict or "", header.end_tick or 0, other))
+    spec = RunSpec(scenario=scenario, image=image, script=script, expected=expected, origin=path)
+    return _job_of_spec(spec, header, seed, as_written)
 
 
 def _job_of_bare(

@@ -8,6 +8,7 @@ import sys
 import msgspec
 import pytest
 
+from miro_exact.installed import entries_of
 from miro_exact.plugins import PluginError, use_one_of
 from miro_exact.raised import raised, raised_at
 from miro_host.laws.yang_kim import Gains
@@ -138,6 +139,25 @@ def test_a_part_that_cannot_be_used_names_its_distribution_and_the_reason(site, 
     message = reason("bad")
     assert message.startswith(f"law 'bad' ({value}, from bad-law 0.3) ")
     assert expected in message
+
+
+@pytest.mark.parametrize("error", [AttributeError, ValueError])
+def test_an_entry_point_that_names_no_module_is_one_line_whatever_its_library_raises(
+    site, monkeypatch, error
+):
+    """`importlib.metadata` raises AttributeError; the package `importlib_metadata`, once imported, ValueError."""
+
+    def load(entry):
+        raise error("Invalid object reference.\nSee https://packaging.python.org")
+
+    install(site, "bad-law", "0.3", {"bad": "1 + 1"})
+    (entry,) = entries_of("mirotwin.laws", "bad")
+    monkeypatch.setattr(type(entry), "load", load)
+    expected = (
+        f"law 'bad' (1 + 1, from bad-law 0.3) cannot be imported: {error.__name__}: Invalid object reference."
+    )
+    assert reason("bad").startswith(expected)
+    assert "\n" not in reason("bad")
 
 
 def test_one_name_in_two_distributions_is_refused(site):

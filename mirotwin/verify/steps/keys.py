@@ -8,7 +8,6 @@ What a step leaves is an attribute of `Player`; `Run.result` and `play_at_port` 
 from __future__ import annotations
 
 import re
-from collections.abc import Iterator, Mapping
 from typing import TYPE_CHECKING, Annotated, Any, ClassVar, Literal
 
 import msgspec
@@ -22,10 +21,10 @@ from miro_exact.clock import (
     TICKS_PER_SECOND,
 )
 from miro_host.wheels import UNITS_PER_COUNT, Wheels, nearest
-from miro_protocol.actions import Power, PutValue, RadioState, Reset
+from miro_protocol.actions import Power, RadioState, Reset
 from miro_protocol.frames import ServiceFrame, TeamFrame
 from miro_protocol.table import DOWNLINK, SEQ_MODULUS, Opcode
-from miro_robot.parts.values import checked_put
+from miro_robot.parts.values import checked_put, leaves
 from miro_sim.world.conditions import (
     BOTH,
     Followed,
@@ -590,16 +589,6 @@ class PressStep(Step, frozen=True, kw_only=True):
 
     def do(self, player: Player) -> None:
         player.press(self.press, self.for_ms)
-
-
-def leaves(table: Mapping[str, Any], above: str = "") -> Iterator[tuple[str, PutValue]]:
-    """The values of a table of tables, by their paths."""
-    for key, value in table.items():
-        path = f"{above}{key}"
-        if isinstance(value, Mapping):
-            yield from leaves(value, f"{path}.")
-        else:
-            yield path, value
 
 
 PLAIN: dict[str, type[Step]] = {

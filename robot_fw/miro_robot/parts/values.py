@@ -6,7 +6,7 @@ A level can be put on a port pin that nothing drives, too: `P1.0 = 0`.
 from __future__ import annotations
 
 import re
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from typing import Any
 
 import msgspec
@@ -19,6 +19,16 @@ from miro_robot.parts.keys import PartKeys
 _PORT_PIN = re.compile(r"P[0-3]\.[0-7]")
 Parts = Mapping[str, PartKeys]
 """The parts of a board by their names."""
+
+
+def leaves(table: Mapping[str, Any], above: str = "") -> Iterator[tuple[str, Any]]:
+    """The values of a table of tables, by their paths."""
+    for key, value in table.items():
+        path = f"{above}{key}"
+        if isinstance(value, Mapping):
+            yield from leaves(value, f"{path}.")
+        else:
+            yield path, value
 
 
 def checked_read(parts: Parts, path: str) -> tuple[str, str]:

@@ -25,11 +25,12 @@ from msgspec import Meta
 from msgspec.structs import replace
 
 from miro_exact.bad_input import BadInput, did_you_mean
+from miro_exact.clock import ticks
 from miro_exact.inputs import path_beside
 from miro_protocol.toml_text import TomlError, check_numbers, struct_of
 from miro_robot.board_spec import BoardSpec
 from miro_robot.parts.resolve import resolve
-from miro_robot.parts.values import checked_put
+from miro_robot.parts.values import checked_put, leaves
 from miro_sim.scenario import file as robots_file
 from miro_sim.scenario.base import SCENARIO, is_path, with_base
 from miro_sim.scenario.board import BoardScenario
@@ -185,7 +186,7 @@ def _scenario(raw: Table, origin: str) -> BoardScenario:
             board = board_of_table(file.board, "")
         board = _strapped(board, file.straps)
         put = _puts(board, file.put)
-        duration_ticks = max(1, int(file.duration_s * board.crystal_hz + 0.5))
+        duration_ticks = max(1, ticks(file.duration_s, board.crystal_hz))
         try:
             return BoardScenario(
                 name=file.name,
@@ -229,7 +230,7 @@ def _puts(board: BoardSpec, table: Table) -> dict[str, Any]:
     parts = {name: part.keys for name, part in board.parts.items()}
     pins = resolve(board).free_pins()
     puts = {}
-    for path, value in _flat(table):
+    for path, value in leaves(table):
         try:
             name, _, puts[path] = checked_put(parts, path, value)
             if name not in parts and path not in pins:
@@ -238,15 +239,6 @@ def _puts(board: BoardSpec, table: Table) -> dict[str, Any]:
             reason, _, remedy = f"{error}".removeprefix(f"{path}: ").partition("; ")
             raise BadInput("", f"put.{path}", reason, remedy) from None
     return puts
-
-
-def _flat(table: Table, above: str = "") -> list[tuple[str, Any]]:
-    """The values of nested tables by their dotted path."""
-    found: list[tuple[str, Any]] = []
-    for key, value in table.items():
-        path = f"{above}{key}"
-        found += _flat(value, f"{path}.") if isinstance(value, dict) else [(path, value)]
-    return found
 
 
 def firmware_beside(text: BoardText) -> str:
