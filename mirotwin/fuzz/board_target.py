@@ -85,7 +85,8 @@ class BoardTarget(Target):
         if not bit_ticks and machine is not None and machine.choices and not is_up(machine.cpu):
             baud = baud or UNHEARD_BAUD
         if not bit_ticks:
-            bit_ticks = bit_ticks_of(self.machine, clock, baud, boot_ms)
+            waited_ms = boot_ms if machine is None else 1000 * machine.begin_tick // clock
+            bit_ticks = bit_ticks_of(self.machine, clock, baud, waited_ms)
         begin_tick = CYCLE_TICKS * self.machine.cpu.cycles
         self.scenario = replace(self.scenario, bit_ticks=bit_ticks, begin_tick=begin_tick)
         self.subject = Subject(self.machine.device, image, begin_tick, clock=clock, begin_tick=begin_tick)

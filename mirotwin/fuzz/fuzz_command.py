@@ -6,7 +6,7 @@ This is one of the few places that know the wall clock.
 from __future__ import annotations
 
 import time
-from collections.abc import Iterable, Mapping
+from collections.abc import Iterable
 from contextlib import suppress
 from itertools import takewhile
 from pathlib import Path
@@ -203,9 +203,10 @@ def fuzz(options: FuzzOptions) -> int:
 
     With --bare it is any 8051 firmware with a serial port, on a processor to which nothing of the robot is connected.
 
-    BOARD is a NAME.board.toml, with --firmware, or the scenario of a board. Inputs are characters and values of its
-    parts. They begin after the waits with which the scenario's steps begin; without steps, once the firmware sleeps, or
-    its receiver is on and no branch was new for 300 ms; or after --boot-ms. The scenario's [expect] judges each input.
+    BOARD is a NAME.board.toml, with --firmware, or the scenario of a board. Inputs are characters, values of its parts
+    and levels on pins that nothing drives. They begin after the waits with which the scenario's steps begin; without
+    steps, once the firmware sleeps, or its receiver is on and no branch was new for 300 ms; or after --boot-ms. The
+    scenario's [expect] judges each input.
 
     Ctrl-C ends a campaign early, with all that was found.
 
@@ -324,7 +325,7 @@ def _campaign(
         tell = (lambda crash: None) if options.quiet else _tell
         campaign = Campaign(engine, triage, expected, covering, tell)
         campaign.begin_with(failing, (*passing, *silent))
-        return _run(campaign, options.time_s if passing else 0.0, options.quiet, in_files(options.expected))
+        return _run(campaign, options.time_s if passing else 0.0, options)
 
 
 def _engine(spec: TargetSpec, passing: list[bytes], folder: CampaignFolder, options: FuzzOptions) -> Engine:
@@ -351,10 +352,10 @@ def _sorted_out(target: Target, inputs: Iterable[bytes]) -> tuple[list[bytes], l
     return failing, passing, silent
 
 
-def _run(campaign: Campaign, time_s: float, quiet: bool, in_files: Mapping[str, str]) -> int:
+def _run(campaign: Campaign, time_s: float, options: FuzzOptions) -> int:
     """The campaign to its end, whatever ends it; the exit code."""
     stopped: BaseException | None = None
-    left = 0
+    left, quiet = 0, options.quiet
     with FuzzProgress(campaign.triage.target.image.path.name, time_s, quiet) as progress:
         campaign.show = progress.show
         try:
@@ -373,7 +374,8 @@ def _run(campaign: Campaign, time_s: float, quiet: bool, in_files: Mapping[str, 
             stopped = error
             with suppress(BadInput, PluginError):
                 left = campaign.finish(INTERRUPTED_S)
-    code = _report(Results(campaign, left, stopped is None, in_files), quiet)
+    own = in_files(options.expected)
+    code = _report(Results(campaign, left, stopped is None, own, options.parts), quiet)
     if stopped is not None:
         raise stopped
     return code

@@ -25,14 +25,22 @@ SUMMARY = "summary.json"
 class Results:
     """Of a campaign that is over. `left`: inputs that were not looked at; `complete`: it came to the end of its time.
 
-    `in_files`: the checks of --expect that are in a file, by their name, as FILE.py:CLASS.
+    `in_files`: the checks of --expect that are in a file, by their name, as FILE.py:CLASS; `parts`: those of --part.
     """
 
-    def __init__(self, campaign: Campaign, left: int, complete: bool, in_files: Mapping[str, str]) -> None:
+    def __init__(
+        self,
+        campaign: Campaign,
+        left: int,
+        complete: bool,
+        in_files: Mapping[str, str],
+        parts: tuple[str, ...] = (),
+    ) -> None:
         self.campaign = campaign
         self.left = left
         self.complete = complete
         self.in_files = in_files
+        self.parts = parts
         self.triage = campaign.triage
         self.out = campaign.triage.folder.path
         self.progress = campaign.progress()
@@ -90,7 +98,7 @@ class Results:
         reached_by, covering = self.campaign.reached_by, self.campaign.covering
         if reached_by is not None and covering is not None:
             yield f"--covering {covering.name}: reached by {reached_by}"
-            yield f"    {replay_line(reached_by, foreign_path(triage.target.image))}"
+            yield f"    {replay_line(reached_by, foreign_path(triage.target.image), parts=self.parts)}"
 
     def write(self) -> None:
         """The files of the campaign. Raises OutputError."""
@@ -116,8 +124,8 @@ class Results:
         expected = (self.in_files[crash.check],) if crash.check in self.in_files else ()
         stream = self.out / crash.folder / f"{crash.name}.stream"
         image = foreign_path(self.triage.target.image)
-        yield f"    {replay_line(stream, image, expected)}"
-        yield f"    {debug_line(stream, image, expected=expected)}"
+        yield f"    {replay_line(stream, image, expected, self.parts)}"
+        yield f"    {debug_line(stream, image, expected=expected, parts=self.parts)}"
 
     def _summary(self) -> dict[str, Any]:
         campaign, progress, tracefile = self.campaign, self.progress, self.coverage.tracefile

@@ -78,6 +78,9 @@ class WiredMachine:
             self.how = _played(run)
         else:
             self.how = self._settled(boot_ms)
+        if isinstance(self.board, WiredBoard) and self.board.drives_rxd:
+            reason = "something on the board drives P3.0 (RXD), so nothing can be sent to its serial port"
+            raise BadInput(image.path, "", reason, "wire it to another pin")
         if self.board.faults:
             reason = f"comes up with a fault: {self.board.faults[0]}"
             raise BadInput(image.path, "", reason, "mend it, or see `mirotwin run`")

@@ -2,6 +2,11 @@
 
 import pytest
 
+from miro_sim.scenario.board_scenario import load_any
+from mirotwin.fuzz.board_target import BoardTarget
+from mirotwin.fuzz.oracle import BoardOracle
+from mirotwin.fuzz.wired import WiredMachine
+from mirotwin.shell.firmware_image import image_for
 from tests.mirotwin.board_files import ECHO, board_folder
 
 HANGS = ECHO.replace("MOV SBUF,A\nJNB TI,$", "CJNE A,#21h,good\nLJMP 4000h\ngood:\nMOV SBUF,A\nJNB TI,$")
@@ -59,6 +64,39 @@ def test_firmware_without_a_serial_port_is_fuzzed_by_what_its_parts_say(mirotwin
     code, _, err = campaign(mirotwin, tmp_path, tmp_path / "lamp.board.toml", *options)
     assert "after 20 ms, its receiver is off; they put key.pressed" in err
     assert code == 1, err
+
+
+CONTENDS = """
+crystal_hz = 11_059_200
+[parts.key]
+part = "button"
+pins = { pin = "OTHER" }
+[parts.driver]
+part = "l298"
+pins = { ena = "1", in1 = "P2.0", in2 = "P2.1", out1 = "OTHER", out2 = "B" }
+[parts.motor]
+part = "dc_motor"
+pins = { a = "OTHER", b = "B" }
+"""
+
+
+def test_two_drivers_of_one_net_are_a_crash_and_a_board_says_what_drives_rxd(mirotwin, tmp_path):
+    board_folder(tmp_path)
+    board = tmp_path / "lamp.board.toml"
+    board.write_text(CONTENDS)
+    text = load_any(str(board), ("duration_s=1",))
+    image = image_for(text, str(tmp_path / "lamp.hex"))
+    target = BoardTarget(image, machine=WiredMachine(text.scenario, image))
+    which = [path for path, _ in target.machine.choices].index("key.pressed")
+    press = bytes([1, which, 1, 0])
+    assert target.run(b"\x09\x00a") == 0
+    assert target.run(b"\x09\x00a" + press + b"\x09\x00b") == 1
+    assert "let two outputs of different level drive one net" in target.failure.what
+    run = BoardOracle(target, {}).confirm(press, target.failure)
+    assert (run.failure.check, run.failure.fault) == ("no_fault", True)
+    board.write_text(CONTENDS.replace('pin = "OTHER"', 'pin = "P3.0"'))
+    said = mirotwin.ends(2, "fuzz", str(board), "--firmware", str(tmp_path / "lamp.hex"), "--time", "1s")
+    assert "something on the board drives P3.0 (RXD)" in said
 
 
 @pytest.mark.parametrize(
