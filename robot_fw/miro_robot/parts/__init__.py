@@ -2,6 +2,7 @@
 
 ELECTRONICS = {
     "at24c": "miro_robot.parts.at24c:At24c",
+    "bluetooth": "miro_robot.parts.bluetooth:Bluetooth",
     "button": "miro_robot.parts.button:Button",
     "buzzer": "miro_robot.parts.buzzer:Buzzer",
     "dht11": "miro_robot.parts.dht11:Dht11",
@@ -17,6 +18,7 @@ ELECTRONICS = {
     "lm629": "miro_robot.parts.lm629:Lm629Keys",
     "pcf8591": "miro_robot.parts.pcf8591:Pcf8591",
     "relay": "miro_robot.parts.relay:Relay",
+    "rs485": "miro_robot.parts.rs485:Rs485",
     "servo": "miro_robot.parts.servo:Servo",
     "seven_segment": "miro_robot.parts.seven_segment:SevenSegment",
 }

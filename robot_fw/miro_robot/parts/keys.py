@@ -47,11 +47,13 @@ class Place(msgspec.Struct, frozen=True):
 class PartKeys(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_only=True, tag_field="part"):
     """Base of the keys of every part. Derive with `frozen=True, kw_only=True, tag="name_of_the_part"`.
 
-    `PINS`: in the order of their numbers. `PUTS`: what a test may put, each with its type, as
-    `Annotated[float, Meta(ge=2.0)]`. `READS`: what it may read, each with a few words. `SHEET`: the maker's sheet.
+    `PINS`: in the order of their numbers. `AT`: pins of the serial line, with the port pin that they must be on.
+    `PUTS`: what a test may put, each with its type, as `Annotated[float, Meta(ge=2.0)]`. `READS`: what it may read,
+    each with a few words. `SHEET`: the maker's sheet.
     """
 
     PINS: ClassVar[tuple[Pin, ...]] = ()
+    AT: ClassVar[dict[str, str]] = {}
     PUTS: ClassVar[dict[str, Any]] = {}
     READS: ClassVar[dict[str, str]] = {}
     SHEET: ClassVar[str] = ""
@@ -73,6 +75,11 @@ class PartKeys(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_only=
     def never_low(self) -> tuple[str, ...]:
         """Outputs that drive high or let go: who else reads the net sees a change only if something pulls it low."""
         return ()
+
+    @property
+    def line_baud(self) -> int:
+        """The rate of who is at the other end of the serial line behind this part; 0: as if it was not there."""
+        return 0
 
     def make(self, place: Place) -> Part:
         """The part of these keys, soldered to this place."""

@@ -128,6 +128,7 @@ class _Resolver:
             for pin, target in part.pins.items():
                 place = f"parts.{name}.pins.{pin}"
                 net, inverted = self.target(target, place, ((name, pin),))
+                self.check_serial(name, pin, net, inverted)
                 self.wire(net, place).pins.append((name, self.numbers[name][pin], inverted))
         for name, buffer in spec.buffers.items():
             if len(buffer.pins) != 8:
@@ -248,6 +249,19 @@ class _Resolver:
                 wire.latches.append((owner, int(bit)))
             self.wires[net] = wire
         return self.wires[net]
+
+    def check_serial(self, name: str, pin: str, net: str, inverted: bool) -> None:
+        """That a part of the serial line is at the serial port, and the only one there."""
+        port = self.spec.parts[name].keys.AT.get(pin)
+        if port is None:
+            return
+        place = f"parts.{name}.pins.{pin}"
+        if inverted or net != self.named.get(port, port):
+            what = f"{name} carries the serial line, and {pin} is not on {port}"
+            raise BoardError("", place, what, f'write {pin} = "{port}"')
+        for other, part in self.spec.parts.items():
+            if other < name and part.keys.AT:
+                raise BoardError("", place, f"{other} carries the serial line, too", "leave one of them out")
 
     # Constants and resistors
 

@@ -63,7 +63,9 @@ class BoardScenario(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_
     def host_bit_ticks(self) -> int:
         """Length of the host's bits: as given, or at the board's baud; 0 for those of the receiver."""
         board = self.board
-        return self.bit_ticks or ((board.crystal_hz + board.baud // 2) // board.baud if board.baud else 0)
+        bauds = [keys.line_baud for keys in self.parts.values() if keys.line_baud]
+        baud = bauds[0] if bauds else board.baud
+        return self.bit_ticks or ((board.crystal_hz + baud // 2) // baud if baud else 0)
 
     @property
     def parts(self) -> dict[str, PartKeys]:

@@ -15,6 +15,7 @@ from miro_robot.image import Image
 from miro_robot.mcs51.cpu import STOPPED
 from miro_robot.parts.netlist import Netlist
 from miro_robot.parts.values import checked_put, checked_read
+from miro_robot.parts.wire_part import WirePart
 from miro_robot.wired_board import WiredBoard
 from miro_sim.periods import PartValues
 from miro_sim.scenario.board import FASTEST_BIT_TICKS, BoardScenario
@@ -122,7 +123,7 @@ class Wire(Medium):
 
     STATE = {"terminal": Terminal, "bit_ticks": ("q", 0, 1 << 40), "busy_tick": TICK, "transmissions": TICK}
     NOT_HASHED = ("bit_ticks",)
-    NOT_STATE = ("character_ticks", "output")
+    NOT_STATE = ("character_ticks", "output", "between")
 
     def __init__(
         self,
@@ -143,6 +144,8 @@ class Wire(Medium):
         self.transmissions = 0
         self.character_ticks = 0  # of the last one that the board sent
         self.output: Callable[[bytes], object] | None = None
+        parts = board.parts if isinstance(board, WiredBoard) else []
+        self.between = next((part for part in parts if isinstance(part, WirePart)), None)
         outbox = Outbox(0, index, CHARACTER_BITS * self.bit_ticks)
         log = HostLog(index, lambda tick: tick, 0)
         alone = BoardAlone(board, index, image)
@@ -194,6 +197,10 @@ class Wire(Medium):
     def send(self, sent: Transmission) -> None:
         """Start bit, eight data bits, stop bit; a bad one is space for three quarters of a bit."""
         bit, rxd, tick = self.bit_ticks, self.board.cpu.rxd, sent.tick
+        self.transmissions += 1
+        self.busy_tick = tick + len(sent.data) * CHARACTER_BITS * bit
+        if self.between is not None and not self.between.takes(tick, self.busy_tick - bit, len(sent.data)):
+            return
         for place, value in enumerate(sent.data):
             for number, level in enumerate((0, *(value >> data_bit & 1 for data_bit in range(8)))):
                 rxd.append(tick + number * bit, level)
@@ -203,8 +210,6 @@ class Wire(Medium):
                 stop_tick += 3 * bit // 4
             rxd.append(stop_tick, 1)
             tick += CHARACTER_BITS * bit
-        self.busy_tick = tick
-        self.transmissions += 1
 
     def free_tick(self) -> int:
         return self.busy_tick
@@ -232,10 +237,13 @@ class Wire(Medium):
 
     def _sent(self, value: int, tick: int, bits: int, bit_ticks: int) -> None:
         """The board has sent a character of so many `bits`, whose stop bit begins at `tick`."""
+        first_tick = max(0, tick - bits * bit_ticks)
+        if self.between is not None and not self.between.gives(first_tick, tick, bit_ticks):
+            return
         if self.terminal is not None:
             self.terminal.input.heard(value, tick)
         self.character_ticks = (bits + 1) * bit_ticks
-        self.heard.append((value, True, max(0, tick - bits * bit_ticks)))
+        self.heard.append((value, True, first_tick))
         self.log.note_heard([(value, True, tick)])
         if self.output is not None:
             self.output(bytes([value]))

@@ -1,0 +1,15 @@
+cimport cython
+from miro_robot.parts.wire_part cimport WirePart
+
+cdef int _DE, _CONTENTION
+
+
+cdef class Rs485Part(WirePart):
+    cdef public int driving
+    cdef public long long begun_tick, ended_tick
+    cdef public list sent
+
+    cpdef changed(self, unsigned int pins, long long tick)
+    @cython.locals(driving=int)
+    cdef _switch(self, long long tick)
+    cdef _contend(self, long long ago)
