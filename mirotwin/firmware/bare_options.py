@@ -315,6 +315,7 @@ def report(world: World, options: BareOptions) -> int:
         verdict = "passed" if options.until is None else "failed"
     if (board.faults or why in (Ended.CYCLES, Ended.HALTED)) and world.image.symbols.problem:
         complain(f"addresses have no names: {world.image.symbols.problem}")
+    complain(*world.devices[0].notes())
     waiting = serial.waiting_for
     unsent = amount(serial.left, "byte of --stdin was", "bytes of --stdin were")
     if waiting:

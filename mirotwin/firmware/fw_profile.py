@@ -92,7 +92,8 @@ def _print(result: Profile, name: str) -> None:
     if interrupts.row_count:
         show(interrupts)
     stack = result.stack
-    begins = "" if stack.first is None else f"from {stack.first:02X}h, "
+    source = f" ({stack.source})" if stack.source else ""
+    begins = "" if stack.first is None else f"from {stack.first:02X}h{source}, "
     used = "" if stack.first is None else f"{amount(stack.highest - stack.first + 1, 'byte')} used, "
     show(
         f"stack: {begins}highest {stack.highest:02X}h at tick {stack.highest_tick}: "

@@ -289,6 +289,10 @@ class BoardTarget(Target):
         puts = ", ".join(named)
         return f"inputs begin at {at(begin_tick, clock)}: {self.wired.how}; they put {puts or 'nothing'}"
 
+    def chip_notes(self) -> list[str]:
+        """What the processor did while it came up that it cannot, or is reset by."""
+        return [] if self.wired is None else self.wired.device.notes()
+
     def __repr__(self) -> str:
         return f"BoardTarget({self.image.path}, input={self.input!r}, {self.scenario})"
 

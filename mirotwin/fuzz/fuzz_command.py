@@ -307,7 +307,7 @@ def _campaign(
             complain(note)
     _check_at_rest(target, image, options.crystal or hertz)
     if isinstance(target, BoardTarget) and spec.board == "wired":
-        complain(f"{image.path}: {target.note()}")
+        complain(f"{image.path}: {target.note()}", *target.chip_notes())
         for name, reason in target.left_out.items():
             complain(f"{name}: left out, it fails without any input: {reason}")
         judged = {*target.left_out, *(check.name for check in target.checks)}

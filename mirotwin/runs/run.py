@@ -179,6 +179,7 @@ class Run:
         if player is not None and player.failure is not None:
             lines.insert(0, ("failed", f"step failed: {player.failure}"))
         lines += fault_lines(world.devices, NEVER_TICK if self.spec.until_tick is None else self.tick)
+        lines += [("passed", note) for device in world.devices for note in device.notes()]
         parts = [group.verdict() for group in self.judges]
         parts += [verdict for verdict, _ in lines if verdict in ("fault", "failed")]
         return Result(

@@ -362,7 +362,12 @@ class EmptyBoard(ProcessorBoard):
     def fault(self, kind: int, pc: int, tick: int) -> None:
         """Notes a firmware fault; the run stops after this instruction if it has to."""
         if not self.forced:
-            self._note_fault(kind, pc, tick, self.cpu.stack_said() if kind in STACK_FAULTS else "")
+            self._note_fault(kind, pc, tick, self._stack_said() if kind in STACK_FAULTS else "")
+
+    def _stack_said(self) -> str:
+        """Where SP is and where the stack may be, and what says so if no map does."""
+        source = self.image.symbols.stack_source if self.spec.bound_stack else ""
+        return f"{self.cpu.stack_said()}{f' by {source}' if source else ''}"
 
     def _note_fault(self, kind: int, pc: int, tick: int, detail: str) -> None:
         self.fault_count += 1

@@ -85,6 +85,8 @@ class Twin:
                 self.dptrs[self.registers[0xA2] & 1] = what[0]
 
     def read(self, address):
+        if self.chip == "at89s52" and address in (0x84, 0x85):
+            return self.dptrs[1] >> 8 * (address - 0x84) & 0xFF
         if address in (0xA6, 0xE6):
             return 0xFF
         return self.registers.get(address, 0xFF)
@@ -95,7 +97,11 @@ class Twin:
             self.before = before
             self.registers[0xA2] = value & (0x01 if self.chip == "at89s52" else 0x09)
         elif self.chip == "at89s52":
-            if address == 0xA6:
+            if address in (0x84, 0x85):
+                self.before = before
+                low, high = self.dptrs[1] & 0xFF, self.dptrs[1] >> 8
+                self.dptrs[1] = high << 8 | value if address == 0x84 else value << 8 | low
+            elif address == 0xA6:
                 if before == 0x1E and value == 0xE1:
                     self.counter = 0
                 self.before = value

@@ -15,6 +15,7 @@ from miro_exact.bad_input import BadInput, did_you_mean
 from miro_exact.inputs import IMAGE_BYTES, decode, read_input
 from miro_robot.image.evidence import Contradiction, check_cdb, check_map
 from miro_robot.image.keil_map import keil_map, keil_map_path
+from miro_robot.image.start_up import stack_set_up
 from miro_robot.image.symbol_files import Symbol, Symbols, parse_cdb, parse_map, read_text
 
 FLASH_BYTES = 8192  # of an AT89C52
@@ -112,9 +113,11 @@ def parse_hex(
     with ImageError.at(path):
         known, _ = _parsed(content, limit)
     if names is None:
-        symbols = Symbols(partial(_names_beside, path, content, limit), known.used)
+        beside = partial(_names_beside, path, content, limit)
+        symbols = Symbols(beside, known.used, partial(stack_set_up, known.code, known.used))
     else:
-        symbols = Symbols({name: Symbol(*place) for name, place in names.items()}, known.used)
+        given = {name: Symbol(*place) for name, place in names.items()}
+        symbols = Symbols(given, known.used, partial(stack_set_up, known.code, known.used))
     return msgspec.structs.replace(known, path=path, symbols=symbols)
 
 

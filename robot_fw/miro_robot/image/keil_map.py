@@ -188,7 +188,8 @@ class _Reader:
             if segment.memory == "CODE" and "?" in segment.name and segment.first not in begun:
                 names.setdefault(segment.name, Symbol(segment.first, "code"))  # of a library, of constants
             if segment.memory == "IDATA" and segment.name in ("?STACK", "_STACK"):
-                names[STACK] = Symbol(segment.first, "iram")
+                begin = segment.first + (segment.name == "_STACK")  # Raisonance's is what SP is set to
+                names[STACK] = Symbol(begin, "iram")
         in_c = {place.area.rpartition("?")[2].upper() for place, _ in found}
         lines = [
             (

@@ -245,16 +245,19 @@ class Symbols:
     """Names of an image. C names carry the compiler's underscore; lookups take them with or without.
 
     `names`: the names, or a function that reads them, which may raise BadInput. `used`: (first, end) of the addresses
-    that the image has bytes for; code anywhere else has no name. Not given: all have.
+    that the image has bytes for; code anywhere else has no name. Not given: all have. `set_up`: address of the
+    instruction of the start-up code that sets SP, and the value, or a function that finds them.
     """
 
     def __init__(
         self,
         names: dict[str, Symbol] | Callable[[], dict[str, Symbol]],
         used: tuple[tuple[int, int], ...] = (),
+        set_up: Callable[[], tuple[int, int] | None] = lambda: None,
     ) -> None:
         self._given = names
         self._used = used
+        self._set_up = set_up
 
     def with_stack(self, start: int) -> Symbols:
         """The same names with a stack from that address of internal RAM to FFh."""
@@ -282,13 +285,21 @@ class Symbols:
     def stack(self) -> tuple[int, int]:
         """First and last address that the stack may use: from where the linker begins it to the next name above.
 
-        All of internal RAM where nothing says so. SDCC's stack grows upwards, and what lies above it is data.
+        Without a map: from where the start-up code sets it to the top. All of internal RAM where nothing says so. The
+        stack grows upwards, and what lies above it is data.
         """
         start = None if self.problem is not None else self.names.get(STACK)
         if start is None or start.space != "iram":
-            return 0, 0xFF
+            set_up = self._set_up()
+            return (0, 0xFF) if set_up is None else (set_up[1] + 1, 0xFF)
         in_ram = [one.address for one in self.names.values() if one.space == "iram"]
         return start.address, min([*(at for at in in_ram if at > start.address), 0x100]) - 1
+
+    @property
+    def stack_source(self) -> str:
+        """The instruction that the bounds of the stack come from; "" where they are a map's, or not known."""
+        set_up = self._set_up() if self.problem is not None or STACK not in self.names else None
+        return "" if set_up is None else f"MOV SP,#{set_up[1]:02X}h at {set_up[0]:#06x}"
 
     def name_at(self, address: int) -> str:
         """The last code symbol at or before `address`, "" if there is none or there is a `problem`.

@@ -21,7 +21,8 @@ class FunctionProfile(msgspec.Struct, frozen=True):
 
 
 class StackProfile(msgspec.Struct, frozen=True):
-    """`first`: where the linker begins the stack (None: not known); `highest`: the last byte it reached.
+    """`first`: where the linker begins the stack (None: not known), or the instruction `source`, if that is not empty;
+    `highest`: the last byte it reached.
 
     `last`: what lies above belongs to others. `free`: bytes between. `at_least`: bytes that the code itself can take,
     by the functions `deepest`; `unknown`: what of the code could not be followed.
@@ -35,6 +36,7 @@ class StackProfile(msgspec.Struct, frozen=True):
     at_least: int
     deepest: list[str]
     unknown: list[str]
+    source: str
 
 
 class Profile(msgspec.Struct, frozen=True):
@@ -71,6 +73,7 @@ def profile(image: Image, counters: Counters, activity: Activity) -> Profile:
         stack=StackProfile(
             first=first_address or None,
             last=last,
+            source=image.symbols.stack_source,
             highest=activity.highest_sp,
             highest_tick=activity.highest_sp_tick,
             free=max(0, last - activity.highest_sp),

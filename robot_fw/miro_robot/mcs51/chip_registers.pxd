@@ -1,8 +1,9 @@
+cimport cython
 from miro_robot.mcs51.chip cimport Chip
 
 cdef long long NEVER_TICK
 cdef int NO_PAUSE, FLASH_PAUSE, RESET_PAUSE, _RESET_CYCLES
-cdef int _P4, _WDT_CONTR, _AUXR, _AUXR1, _WDTRST, _IPH
+cdef int _DP1L, _DP1H, _P4, _WDT_CONTR, _AUXR, _AUXR1, _WDTRST, _IPH
 cdef int _ISP_DATA, _ISP_ADDRH, _ISP_ADDRL, _ISP_CMD, _ISP_TRIG, _ISP_CONTR
 cdef int _DPS, _GF2, _WDIDLE, _AT_AUXR, _EXTRAM, _STC_AUXR, _AT_PERIOD
 cdef int _EN_WDT, _CLR_WDT, _IDLE_WDT, _WDT_FLAG, _PRESCALER, _STC_COUNTS
@@ -32,7 +33,8 @@ cdef class ChipRegisters:
 
 
 cdef class At89s52Registers(ChipRegisters):
-    pass
+    @cython.locals(pointer=int)
+    cdef int write_dp1(self, int address, int value) except -1
 
 
 cdef class Stc89c52Registers(ChipRegisters):

@@ -20,6 +20,7 @@ from miro_robot.mcs51.chip import LAST_CYCLE, Chip
 
 NO_PAUSE, FLASH_PAUSE, RESET_PAUSE = range(3)
 _RESET_CYCLES = 9  # 98 periods of the crystal, up to the next whole cycle (1919D, "Using the WDT")
+_DP1L, _DP1H = 0x84, 0x85
 _P4, _WDT_CONTR, _AUXR, _AUXR1, _WDTRST, _IPH = 0xE8, 0xE1, 0x8E, 0xA2, 0xA6, 0xB7
 _ISP_DATA, _ISP_ADDRH, _ISP_ADDRL, _ISP_CMD, _ISP_TRIG, _ISP_CONTR = range(0xE2, 0xE8)
 _DPS, _GF2 = 0x01, 0x08  # of AUXR1
@@ -166,9 +167,12 @@ class ChipRegisters:
 
 
 class At89s52Registers(ChipRegisters):
-    """AUXR 8Eh, AUXR1 A2h, WDTRST A6h."""
+    """DP1 84h and 85h, AUXR 8Eh, AUXR1 A2h, WDTRST A6h. 82h and 83h reach the pointer that DPS selects."""
 
     def read(self, address: int) -> int:
+        if address in (_DP1L, _DP1H):
+            pointer = self.cpu.dptr if self.auxr1 & _DPS else self.other_dptr
+            return pointer >> 8 if address == _DP1H else pointer & 0xFF
         return 0xFF if address == _WDTRST else ChipRegisters.read(self, address)  # WDTRST: write only
 
     def write(self, address: int, value: int) -> int:
@@ -177,6 +181,9 @@ class At89s52Registers(ChipRegisters):
                 self.feed()
             self.key = 1 if value == 0x1E else 0
             return 1
+        if address in (_DP1L, _DP1H):
+            self.write_dp1(address, value)
+            return 1
         if address == _AUXR:
             counted = self.count() - self.fed
             self.auxr = value & _AT_AUXR
@@ -184,6 +191,14 @@ class At89s52Registers(ChipRegisters):
             self.plan()
             return 1
         return ChipRegisters.write(self, address, value)
+
+    def write_dp1(self, address: int, value: int) -> None:
+        pointer = self.cpu.dptr if self.auxr1 & _DPS else self.other_dptr
+        pointer = pointer & 0x00FF | value << 8 if address == _DP1H else pointer & 0xFF00 | value
+        if self.auxr1 & _DPS:
+            self.cpu.dptr = pointer
+        else:
+            self.other_dptr = pointer
 
     def counts_idle(self) -> int:
         return 0 if self.auxr & _WDIDLE else 1

@@ -76,6 +76,10 @@ class Device:
                     return stopped or board.run_to_any(self.marks, tick)
         return stopped
 
+    def notes(self) -> list[str]:
+        """What else the processor did that its user should know, a line each."""
+        return []
+
     # Parts of a board
 
     def check_put(self, path: str, value: PutValue) -> None:

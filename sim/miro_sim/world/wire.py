@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable, Sequence
 from typing import Any
 
+from miro_exact.bad_input import amount
 from miro_exact.clock import CHARACTER_BITS, CYCLE_TICKS
 from miro_exact.state import TICK
 from miro_protocol.actions import PutValue, ScriptItem
@@ -13,6 +14,7 @@ from miro_robot.build import board_of
 from miro_robot.empty_board import EmptyBoard
 from miro_robot.image import Image
 from miro_robot.mcs51.cpu import STOPPED
+from miro_robot.mcs51.known_registers import lacking_lines
 from miro_robot.parts.netlist import Netlist
 from miro_robot.parts.values import checked_put, checked_read
 from miro_robot.parts.wire_part import WirePart
@@ -56,6 +58,16 @@ class BoardAlone(Device):
             if not stopped:
                 changes.look_at_grid()
         return stopped or Device.run(self, tick)
+
+    def notes(self) -> list[str]:
+        board = self.board
+        lines = list(lacking_lines(board.spec.chip, board.lacking_registers()))
+        registers = board.registers
+        if registers is not None and registers.bites:
+            first_s = registers.first_bite / board.spec.crystal_hz
+            count = amount(registers.bites, "time")
+            lines.append(f"the watchdog reset the processor {count}, first at {first_s:.4f} s")
+        return lines
 
     def check_put(self, path: str, value: PutValue) -> None:
         name, _, _ = checked_put(self.parts, path, value)

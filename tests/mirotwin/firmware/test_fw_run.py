@@ -281,8 +281,21 @@ def test_a_port_of_9_bits_is_told(mirotwin, tmp_path):
     assert "the serial port takes characters of 9 bits; the ninth was 1 in all that were sent" in err
 
 
-INTO_DATA = bytes.fromhex("75817f c0e0 1581 1581 c0e0 80fe")
-"""MOV SP,#7Fh; PUSH ACC at 80h; DEC SP twice, which leaves it at 7Eh; PUSH ACC at 7Fh; SJMP $."""
+def test_registers_that_the_chip_lacks_are_reported_at_the_end_with_the_chip_that_has_them(
+    mirotwin, tmp_path
+):
+    image = hex_file(tmp_path / "a.ihx", bytes.fromhex("75e646 75e6b9 7591ff e5d9 75f801 80fe"))
+    err = mirotwin.ends(0, "fw", "run", image)
+    assert (
+        'the at89c52 lacks E6h (ISP/IAP, the data flash), accessed 2 times; chip = "stc89c52" has them' in err
+    )
+    modes = "lacks 91h (P0M0 to P2M1, modes of ports), accessed once; STC12, STC15 have, and no chip here"
+    assert f"the at89c52 {modes}" in err
+    assert "the at89c52 lacks F8h, accessed once; they read FFh" in err
+
+
+INTO_DATA = bytes.fromhex("747f f581 c0e0 1581 1581 c0e0 80fe")
+"""MOV A,#7Fh; MOV SP,A; PUSH ACC at 80h; DEC SP twice, which leaves it at 7Eh; PUSH ACC at 7Fh; SJMP $."""
 SAID = "firmware went below the start of its stack (SP 7Eh, its stack is 80h to FFh)"
 
 
@@ -294,6 +307,11 @@ def image(tmp_path):
 def test_data_below_the_stack_is_guarded_where_the_option_says_where_it_begins(mirotwin, image):
     assert mirotwin("fw", "run", image)[:2] == (0, "")
     assert SAID in mirotwin.ends(3, "fw", "run", image, "--stack-from", "0x80")
+
+
+def test_without_a_map_the_start_up_code_says_where_the_stack_begins(mirotwin, tmp_path):
+    image = hex_file(tmp_path / "a.ihx", bytes.fromhex("75817f c0e0 1581 1581 c0e0 80fe"))
+    assert f"{SAID[:-1]} by MOV SP,#7Fh at 0x0000)" in mirotwin.ends(3, "fw", "run", image)
 
 
 def test_a_robot_run_and_the_replay_of_its_recording_know_the_stack(mirotwin, image, tmp_path):
