@@ -17,6 +17,7 @@ Wall times are in a file of their own (`results`), because all the rest is the s
 
 from __future__ import annotations
 
+import math
 import re
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from functools import cached_property, reduce
@@ -126,9 +127,15 @@ def figures_of(summary: AnySummary, tracks: Tracks, values: Mapping[str, type] =
     return found | {path: as_kind(parts[path], kind) for path, kind in values.items() if path in parts}
 
 
-STEP = re.compile(r"step_[0-9]+_ms")
+STEP = re.compile(r"step_([0-9]+)_ms")
 
 
 def step_column(number: int) -> str:
     """The column of how long the wait of step `number` took."""
     return f"step_{number}_ms"
+
+
+def place_of(name: str) -> float:
+    """Where a column stands among the figures of several scenarios: steps by their numbers, then values of parts."""
+    step = STEP.fullmatch(name)
+    return float(step[1]) if step else math.inf if "." in name else 0.0

@@ -20,7 +20,7 @@ from miro_sim.scenario.board_scenario import FIRMWARE, AnyText, BoardText, is_bo
 from miro_sim.scenario.file import builtin_names
 from miro_sim.scenario.plugins import plugins_used
 from miro_sim.scenario.settings import OPTION, option_words
-from mirotwin.campaign.columns import BOARD_FIGURES, CHECK, FIGURES, OWN, step_column
+from mirotwin.campaign.columns import BOARD_FIGURES, CHECK, FIGURES, OWN, place_of, step_column
 from mirotwin.campaign.design import Design, DesignPoint, Factor, Level, Value, as_kind, kind_of
 from mirotwin.campaign.single import image_of, prepared
 from mirotwin.campaign.versions import Versions, versions
@@ -189,7 +189,8 @@ def _tried(plan: Plan) -> Plan:
         checks |= {check.name: None for group in (*expected.values(), *of_steps) for check in group}
         notes |= {_placed_note(plan, places, note): None for note in text.notes}
     used = replace(plan.versions, parts=tuple(sorted(plugins)))
-    return replace(plan, checks=tuple(checks), figures=figures, notes=tuple(notes), versions=used)
+    ordered = {name: figures[name] for name in sorted(figures, key=place_of)}
+    return replace(plan, checks=tuple(checks), figures=ordered, notes=tuple(notes), versions=used)
 
 
 def _figures(plan: Plan, text: AnyText, steps: Sequence[Step], job: Work) -> dict[str, type]:
@@ -208,7 +209,7 @@ def _figures(plan: Plan, text: AnyText, steps: Sequence[Step], job: Work) -> dic
 
 def _kinds_of_values(world: World, paths: Sequence[str]) -> dict[str, type]:
     """The types of columns for these values of parts, by those at power-on: all numbers share one. Raises BadInput."""
-    (board,) = world.devices
+    board = world.device(0, 0)
     kinds: dict[str, type] = {}
     for path in paths:
         try:

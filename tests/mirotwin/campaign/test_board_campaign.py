@@ -224,6 +224,16 @@ def test_what_cannot_be_varied_or_read_is_one_line(mirotwin, tmp_path, monkeypat
     assert sorted(path.suffix for path in Path().iterdir()) == [".hex", ".hex", ".toml", ".toml", ".toml"]
 
 
+def test_scenarios_with_other_steps_share_one_order_of_columns(here):
+    more = SCENARIO.replace("[[step]]", "[[step]]\npause_ms = 1\n[[step]]", 1)
+    (here / "more.scenario.toml").write_text(more)
+    two = 'scenario = ["lamp.scenario.toml", "more.scenario.toml"]\nfirmware = ['
+    (here / "two.toml").write_text(CAMPAIGN.replace("firmware = [", two))
+    names = list(campaign.load(here / "two.toml").figures)
+
+    assert names[-6:] == ["step_1_ms", "step_2_ms", "step_4_ms", "step_5_ms", "lamp.flashes", "key.closed"]
+
+
 def test_robots_have_no_values_of_parts():
     with pytest.raises(
         BadInput, match=r"^short.toml: values: are of a board's parts, and fig7 is for robots; leave"
