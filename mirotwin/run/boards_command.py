@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 import sys
 from collections.abc import Iterator
 from inspect import cleandoc
@@ -28,6 +29,7 @@ from mirotwin.shell.json_text import print_json
 from mirotwin.shell.options import JSON
 from mirotwin.shell.part_files import Parts, bring_parts
 
+_SENTENCE = re.compile(r"\.\s")
 KINDS = {IN: "input", STRONG: "output", OPEN_DRAIN: "open drain", TWO_WAY: "input and output"}
 
 
@@ -199,7 +201,7 @@ def _text(struct: type[PartKeys]) -> str:
 def _about(struct: type[PartKeys], text: str) -> str:
     """In one line; a part that another one of its file is based on says itself what it is."""
     doc = struct.__doc__ if struct.__base__ is not PartKeys else None
-    return f"{doc.partition('. ')[0].rstrip('.')}." if doc else text.partition("\n")[0]
+    return f"{_SENTENCE.split(doc)[0].rstrip('.')}." if doc else text.partition("\n")[0]
 
 
 def _keys(struct: type[msgspec.Struct], above: str = "", whole: Any = None) -> Iterator[Key]:

@@ -15,6 +15,7 @@ def test_boards_and_parts_are_listed_with_a_line_each(mirotwin):
     rows = {line.split()[0]: line for line in mirotwin.succeeds("boards").splitlines() if line.strip()}
     assert {*builtin_boards(), *PARTS.own} <= set(rows)
     assert rows["miro"].endswith("at89c52  24 MHz   differential_drive, lm629")
+    assert rows["relay"].endswith("and a contact that follows some milliseconds later.")
     assert rows["led"].endswith("A light-emitting diode with its resistor, to VCC or to ground.")
 
 
