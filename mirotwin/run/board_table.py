@@ -26,6 +26,8 @@ def board_table(summary: BoardSummary, serial: SerialCounts, image: str, folder:
 
 def _serial_text(summary: BoardSummary, serial: SerialCounts) -> str:
     text = f"{amount(summary.serial.to_board, 'byte')} to the board, {summary.serial.from_board} from it"
+    if summary.serial.firmware_baud:
+        text += f"; the firmware has {summary.serial.firmware_baud} baud, [serial] has another rate"
     if not serial.tail:
         return text
     shown = serial.tail.decode("ascii", "backslashreplace")

@@ -36,11 +36,12 @@ class SerialCounts(msgspec.Struct):
                 self.tail = (self.tail + sent.data)[-TAIL_BYTES:]
 
 
-class SerialFigures(msgspec.Struct, frozen=True):
-    """Characters to the board and from it."""
+class SerialFigures(msgspec.Struct, frozen=True, omit_defaults=True):
+    """Characters to the board and from it. `firmware_baud`: of its receiver, where the board file has another rate."""
 
     to_board: int
     from_board: int
+    firmware_baud: int = 0
 
 
 class BoardSummary(msgspec.Struct, frozen=True, omit_defaults=True):
@@ -74,6 +75,15 @@ class BoardSummary(msgspec.Struct, frozen=True, omit_defaults=True):
 AnySummary = Summary | BoardSummary
 
 
+def _other_baud(world: World) -> int:
+    """The receiver's rate where it is more than 4 % from the board's: a real terminal of that rate reads nothing."""
+    wanted, bit_ticks = world.scenario.board.baud, world.devices[0].board.cpu.peripherals.bit_ticks()
+    if not wanted or not bit_ticks:
+        return 0
+    baud = round(world.clock / bit_ticks)
+    return baud if abs(baud - wanted) > 0.04 * wanted else 0
+
+
 def summarise_board(world: World, serial: SerialCounts, wall_s: float, begin_tick: int = 0) -> BoardSummary:
     """The summary of a run of `world` from `begin_tick`, without what only some runs have."""
     scenario, clock = world.scenario, world.clock
@@ -94,7 +104,7 @@ def summarise_board(world: World, serial: SerialCounts, wall_s: float, begin_tic
         simulated_s=world.tick / clock,
         wall_s=wall_s,
         realtime_factor=(world.tick - begin_tick) / clock / wall_s if wall_s > 0.0 else 0.0,
-        serial=SerialFigures(serial.to_board, serial.from_board),
+        serial=SerialFigures(serial.to_board, serial.from_board, _other_baud(world)),
         firmware=FirmwareCounts(sha256=world.image.sha256 or "", **counters["firmware"]),
         parts=values,
         resumed_s=begin_tick / clock if begin_tick else None,

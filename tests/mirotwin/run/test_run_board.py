@@ -7,7 +7,7 @@ import pytest
 
 from miro_robot.firmware import image_path
 from mirotwin.recording.reader import read
-from tests.mirotwin.board_files import SCENARIO, board_folder
+from tests.mirotwin.board_files import BOARD, SCENARIO, board_folder
 
 PERIOD_S = 2_400_000 / 11_059_200
 ROM = """
@@ -55,6 +55,14 @@ def test_the_recording_holds_the_whole_board_its_bytes_and_the_values_of_its_par
 def test_the_same_run_gives_the_same_bytes(mirotwin, finished, scenario, tmp_path):
     assert mirotwin("run", scenario, "--out", tmp_path / "again", "--quiet") == (0, "", "")
     assert (tmp_path / "again" / "run.mcap").read_bytes() == (finished / "run.mcap").read_bytes()
+
+
+@pytest.mark.parametrize(("baud", "told"), [(9400, None), (9000, 9600)])
+def test_a_board_whose_terminal_has_another_rate_than_its_firmware_is_told(mirotwin, tmp_path, baud, told):
+    path = board_folder(tmp_path, board=f"{BOARD}[serial]\nbaud = {baud}\n")
+    out = mirotwin.succeeds("run", path, "--out", tmp_path / "out")
+    assert json.loads((tmp_path / "out" / "summary.json").read_bytes())["serial"].get("firmware_baud") == told
+    assert ("the firmware has 9600 baud, [serial] has another rate" in " ".join(out.split())) == bool(told)
 
 
 def test_the_table_names_what_matters(mirotwin, scenario, tmp_path):
