@@ -86,10 +86,11 @@ class Lcd:
             fast = self.rise is not None and tick - self.rise < self.limits["cycle"]
             self.broken += bool(late or fast)
             self.rise = tick
-        elif "e" in changed and self.rise is not None:
+        elif "e" in changed and (self.rise is not None or tick >= self.busy_until):
+            self.rise = -(10**9) if self.rise is None else self.rise  # it was high from power-on on
             self.fall(tick, {**before, **self.driven(tick, before)}, {*changed} - {"e"})
         elif "e" in changed:
-            self.rise = -(10**9)  # it was high from power-on on
+            self.rise = -(10**9)
         for name in (*changed, *touched):
             self.moved[name] = tick
 

@@ -15,6 +15,9 @@ breaks the bus timing is counted in `short_pulses` and taken all the same; of si
 falls, what they were before. From a processor of 12 ticks a cycle E is never too short below 48 MHz: what is left is
 RS, R/W or data that are written by the same instruction as E.
 
+For `reset_ms` after power-on it takes nothing. A processor whose reset pin hangs on a capacitor begins later than that:
+`reset_ms = 0` is then what its program finds.
+
 A program that reads the busy flag while its port still drives data low works against the display's outputs: contention,
 a fault. They source 0.2 mA (DC characteristics), so the port wins; `allow_contention = ["P0"]` lets it be.
 """
@@ -155,7 +158,7 @@ class Lcd1602Part(Part):
         self.data = self.half = 0
         self.busy_tick = tick + self.reset_ticks
         self.count_tick = 0
-        self.rise_tick = _NEVER  # ports are high from power-on on: that E falls then is no pulse
+        self.rise_tick = _NEVER  # ports are high from power-on on: that E falls within the reset is no pulse
         self._answer(tick)
 
     def supply(self, on: int, tick: int) -> None:
@@ -216,7 +219,8 @@ class Lcd1602Part(Part):
         """E falls: a byte, or half of one, has come or gone."""
         if self.rise_tick == _NEVER:
             self.rise_tick = 0
-            return
+            if tick < self.busy_tick:
+                return
         before = self.levels ^ pins
         is_read = before & _RW
         late = not is_read and (pins & (_SELECT | _DATA) or tick - self.data_tick < self.data_ticks)

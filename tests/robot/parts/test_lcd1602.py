@@ -4,7 +4,7 @@ import msgspec
 import pytest
 
 from miro_robot.parts.lcd1602 import Lcd1602, Lcd2004
-from tests.robot.parts.wires import DATA, MS, US, LcdBus
+from tests.robot.parts.wires import DATA, MS, US, LcdBus, Wires
 
 BLANK = " " * 16
 
@@ -36,6 +36,17 @@ def test_after_power_on_it_shows_nothing_and_is_busy_for_10_ms():
     lcd.command(0x0C)
     lcd.print("one line of eight bits")
     assert (lcd.value("row1"), lcd.value("row2")) == ("one line of eigh", BLANK)
+
+
+@pytest.mark.parametrize(("reset_ms", "shown"), [(0, 1), (20, 0)])
+def test_an_enable_that_was_high_from_power_on_writes_when_it_falls_after_the_reset(reset_ms, shown):
+    nets = ["rs", "rw", "e", *DATA]
+    lcd = Wires(Lcd1602(reset_ms=reset_ms), {net: net for net in nets}, nets)
+    lcd.later(10 * MS)
+    lcd.set(rs=0, rw=0, **{net: 0x0C >> bit & 1 for bit, net in enumerate(DATA)})
+    lcd.later(US)
+    lcd.set(e=0)
+    assert (lcd.value("on"), lcd.value("lost"), lcd.value("short_pulses")) == (shown, 0, 0)
 
 
 def test_the_time_after_power_on_is_a_key():
