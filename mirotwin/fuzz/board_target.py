@@ -20,7 +20,7 @@ from miro_protocol.protocol import Frame, Protocol
 from miro_protocol.transmission import DOWN, Transmission
 from miro_robot.board_spec import CRYSTAL_HZ
 from miro_robot.harness.harness import AWAKE, SETTLE_TICKS, Harness
-from miro_robot.harness.program import INPUTS, Program
+from miro_robot.harness.program import INPUTS, RESET_TICKS, Program
 from miro_robot.harness.recording_bus import LONGEST_ANSWER_TICKS
 from miro_robot.image import SPACE_BYTES, Image
 from miro_robot.mcs51.chips import CHIPS
@@ -93,7 +93,7 @@ class BoardTarget(Target):
         self.checks = checks
         for check in checks:
             _refuse_unseen(check, self.subject)
-        self.oracle = self.machine.oracle
+        self.oracle, self.bus = self.machine.oracle, self.machine.bus
         after = -1 if after_ticks is None else after_ticks
         state, cpu = self.machine.board, self.machine.cpu
         harness = Harness(state, cpu, self.oracle, bit_ticks, after_ticks=after, device=machine)
@@ -159,7 +159,7 @@ class BoardTarget(Target):
 
     def _feed(self, monitor: Any) -> None:
         """Tells a monitor what the serial port took and gave in the last run, and of the last reset."""
-        bus = self.machine
+        bus = self.bus
         # Without events where it can be: they take longer to make than a short run.
         if type(monitor).event is SerialMonitor.event:
             monitor.received = [Character(value, tick, bool(stop)) for value, stop, tick in bus.heard]
@@ -170,23 +170,25 @@ class BoardTarget(Target):
                 for value, stop, tick in bus.heard
             ]
             events += [Event(tick=tick, what="transmitted", slot=0, value=value) for value, tick in bus.said]
-            events += [Event(tick=tick, what="heard", value=value) for value, tick in bus.to_pc]
+            to_pc = getattr(bus, "to_pc", ())  # of a board with parts
+            events += [Event(tick=tick, what="heard", value=value) for value, tick in to_pc]
             for event in sorted(events, key=_BY_TICK):
                 if event.what in monitor.EVENTS:
                     monitor.event(event)
         if bus.reset_tick >= 0:
+            monitor.restarted(bus.reset_tick - RESET_TICKS)  # its pin goes up, and down
             monitor.restarted(bus.reset_tick)
 
     def _awake(self) -> int:
         """Firmware that waits for its transmitter is awake, and no worse for it: as long as it sends, it may go on."""
-        cpu, bus = self.cpu, self.machine
+        cpu, bus = self.cpu, self.bus
         end = 12 * cpu.cycles + LONGEST_ANSWER_TICKS
         sent = -1
         while sent != len(bus.said) and 12 * cpu.cycles < end:
             sent = len(bus.said)
             idle = cpu.idle_cycles
-            bus.run(self.end_tick() + SETTLE_TICKS)
-            if bus.fault() is not None:
+            self.machine.run(self.end_tick() + SETTLE_TICKS)
+            if bus.fault_kind:
                 return NO_FAULT_CODE
             if cpu.idle_cycles > idle:
                 return 0

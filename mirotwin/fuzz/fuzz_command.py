@@ -13,6 +13,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any, Literal, Self, cast
 
 import click
+from msgspec.structs import replace
 
 from miro_exact import engine as engines
 from miro_exact.bad_input import BadInput, amount
@@ -228,22 +229,17 @@ def fuzz(options: FuzzOptions) -> int:
         reason = f"--slot {options.slot} does not exist among {robots} robots"
         raise click.UsageError(f"{reason}; give 0 to {robots - 1}.")
     parameters = {"crystal_hz": options.crystal, "boot_ms": options.boot_ms}
-    spec = TargetSpec(
+    hertz = options.crystal or TICKS_PER_SECOND
+    spec = replace(
+        _common(options, hertz),
         board="bare" if options.bare else "miro",
         image=options.image or "",
-        input=options.kind,
         robots=robots,
         slot=options.slot,
-        protocol=options.protocol or "",
         expected=options.expected if options.expect_all else (),
-        baud=options.baud or 0,
-        after_ticks=None
-        if options.after is None
-        else options.after.ticks(options.crystal or TICKS_PER_SECOND),
         parameters={name: value for name, value in parameters.items() if value is not None},
-        engine=cast(Literal["compiled", "python"], engines.active()),
     )
-    return _campaign(spec, firmware, options, _expected(options))
+    return _campaign(spec, firmware, options, _expected(options), hertz)
 
 
 def _fuzz_board(options: FuzzOptions) -> int:
@@ -267,31 +263,34 @@ def _fuzz_board(options: FuzzOptions) -> int:
         complain(f"{source}: steps {count + 1} to {len(steps)} are left out: inputs take their place")
     image = image_for(text, options.firmware)
     hertz = text.scenario.clock
-    spec = TargetSpec(
+    spec = replace(
+        _common(options, hertz),
         board="wired",
         image=str(image.path),
-        input=options.kind,
-        protocol=options.protocol or "",
         expected=options.expected,
-        baud=options.baud or 0,
-        after_ticks=None if options.after is None else options.after.ticks(hertz),
         parameters={
             "tables": text.tables,
             "steps": count,
             "boot_ms": options.boot_ms or 0,
             "parts": options.parts,
         },
-        engine=cast(Literal["compiled", "python"], engines.active()),
     )
     return _campaign(spec, image, options, text.scenario.expect, hertz)
 
 
+def _common(options: FuzzOptions, hertz: int) -> TargetSpec:
+    """What is the same of all boards."""
+    return TargetSpec(
+        input=options.kind,
+        protocol=options.protocol or "",
+        baud=options.baud or 0,
+        after_ticks=None if options.after is None else options.after.ticks(hertz),
+        engine=cast(Literal["compiled", "python"], engines.active()),
+    )
+
+
 def _campaign(
-    spec: TargetSpec,
-    image: Image,
-    options: FuzzOptions,
-    expected: dict[str, Any],
-    hertz: int = TICKS_PER_SECOND,
+    spec: TargetSpec, image: Image, options: FuzzOptions, expected: dict[str, Any], hertz: int
 ) -> int:
     default = Path("runs") / f"fuzz-{image.path.stem}"
     folder = CampaignFolder(options.out or (default if options.force else unused(default)), options.force)
@@ -305,7 +304,7 @@ def _campaign(
         inputs |= dict.fromkeys(taken)
         for note in notes:
             complain(note)
-    _check_at_rest(target, image, options.crystal or hertz)
+    _check_at_rest(target, image, hertz)
     if isinstance(target, BoardTarget) and spec.board == "wired":
         complain(f"{image.path}: {target.note()}", *target.chip_notes())
         for name, reason in target.left_out.items():

@@ -48,22 +48,6 @@ class Processor:
     device = board
     script: Sequence[ScriptItem] = ()
     """What brought it up."""
-    to_pc: Sequence[tuple[int, int]] = ()
-
-    @property
-    def heard(self) -> list[tuple[int, int, int]]:
-        """What the serial port received: value, bit RB8, tick of RI."""
-        return self.bus.heard
-
-    @property
-    def said(self) -> list[tuple[int, int]]:
-        """What it sent: value, tick of TI."""
-        return self.bus.said
-
-    @property
-    def reset_tick(self) -> int:
-        """Of the last reset, -1 without one."""
-        return self.bus.reset_tick
 
     def run(self, tick: int) -> int:
         return self.cpu.run(-(-tick // CYCLE_TICKS))

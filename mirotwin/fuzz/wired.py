@@ -19,10 +19,8 @@ from miro_protocol.actions import Put, PutValue, ScriptItem
 from miro_robot.empty_board import EmptyBoard
 from miro_robot.event_log import RECEIVED, SENT
 from miro_robot.faults import FirmwareFault
-from miro_robot.harness.harness import LiveOracle
-from miro_robot.harness.recording_bus import LONGEST_ANSWER_TICKS
+from miro_robot.harness.recording_bus import BareOracle
 from miro_robot.image import Image
-from miro_robot.mcs51.uart import STOPPED_TICK
 from miro_robot.parts.keys import PartKeys
 from miro_robot.parts.values import checked_put
 from miro_robot.wired_board import WiredBoard
@@ -48,7 +46,7 @@ Choice = tuple[str, Callable[[int], PutValue]]
 class WiredMachine:
     """A board with its firmware up, as `Processor` is for a bare one. `script`: what brought it up. `choices`: what an
     input may put, the first `values` of them values of parts, then pins. `to_pc`: characters that the board has sent
-    since the last `back`, with the tick of their stop bit.
+    since the last `begin`, with the tick of their stop bit.
 
     The first `count` of the `steps` bring it up. Without any it is up when it sleeps, or when its receiver is on and no
     branch was new for 300 ms; or after `boot_ms`, if that is given. Raises BadInput for firmware that fails meanwhile.
@@ -93,11 +91,12 @@ class WiredMachine:
         self.choices = [*values, *((pin, _level) for pin in pins)]
         self.to_pc: list[tuple[int, int]] = []
         self.reset_tick = -1
-        self.oracle = WiredOracle(self)
+        self.bus = self  # it keeps what the serial port did, as a `RecordingBus` does
+        self.oracle = BareOracle(self, self.cpu)
         self.cpu.rxd.settled_tick = NEVER_TICK
         self.board.input_tick = 0  # a character may always wake it
         self.board.sent = self._sent
-        self.back()
+        self.begin()
 
     def _settled(self, boot_ms: int) -> str:
         """Runs until the firmware sleeps or settles, or so long; how it is known."""
@@ -139,8 +138,8 @@ class WiredMachine:
         path, value_of = self.choices[which]
         self.device.put(path, value_of(value), tick)
 
-    def back(self) -> None:
-        """It was put back to where it began."""
+    def begin(self) -> None:
+        """It was put back to where it begins: forgets what it kept."""
         board = self.board
         board.faults.clear()
         board.log.cut(0)
@@ -172,6 +171,15 @@ class WiredMachine:
     def fault(self) -> FirmwareFault | None:
         """The first one of the last run."""
         return self.board.faults[0] if self.board.faults else None
+
+    @property
+    def fault_kind(self) -> int:
+        """Of the first fault, 0 without one."""
+        return self.board.faults[0].kind if self.board.faults else 0
+
+    @property
+    def fault_tick(self) -> int:
+        return self.board.faults[0].tick
 
     @property
     def heard(self) -> list[tuple[int, int, int]]:
@@ -208,37 +216,6 @@ def _let_arrive(world: World) -> None:
         line.outbox.waiting or line.actions.waiting or line.free_tick() > world.tick
     ):
         world.run_to(max(world.tick, line.free_tick()) + 1)
-
-
-class WiredOracle(LiveOracle):
-    """Finds firmware faults, and lets a run go on while the serial port sends."""
-
-    NOT_STATE = ("*",)
-
-    def __init__(self, machine: WiredMachine) -> None:
-        LiveOracle.__init__(self)
-        self.machine = machine
-        self.slept_tick = -1
-
-    def begin(self, tick: int) -> None:
-        LiveOracle.begin(self, tick)
-        self.slept_tick = -1
-
-    def restarted(self, tick: int) -> None:
-        self.machine.reset_tick = tick
-
-    def look(self, tick: int) -> None:
-        if self.machine.board.faults and self.code == 0:
-            self.code, self.tick = 1, self.machine.board.faults[0].tick
-
-    def waits(self) -> bool:
-        cpu = self.machine.cpu
-        now = cpu.cycles * CYCLE_TICKS
-        if self.slept_tick < 0:
-            self.slept_tick = now
-        if cpu.powered_down or now - self.slept_tick > LONGEST_ANSWER_TICKS:
-            return False
-        return bool(cpu.peripherals.uart.ti_tick() < STOPPED_TICK)
 
 
 # What is put

@@ -43,13 +43,21 @@ class PwmMonitor(Monitor[PwmAtLeast]):
 
     def __init__(self, check: PwmAtLeast, subject: Subject) -> None:
         super().__init__(check, subject)
-        begin, self.clock = subject.begin_tick, subject.clock
-        off_hz = 1000.0 / check.off_after_ms
-        self.periods = {
-            pin: Following(Frequency(pin=pin, at_least_hz=off_hz), subject, begin) for pin in check.pins
-        }
+        self._follow(subject.begin_tick)
         self.unseen = next((one.unseen for one in self.periods.values()), "")
-        self.slow = dict.fromkeys(check.pins, False)
+
+    def _follow(self, begin_tick: int) -> None:
+        off_hz = 1000.0 / self.check.off_after_ms
+        self.periods = {
+            pin: Following(Frequency(pin=pin, at_least_hz=off_hz), self.subject, begin_tick)
+            for pin in self.check.pins
+        }
+        self.slow = dict.fromkeys(self.check.pins, False)
+
+    def restarted(self, tick: int) -> None:
+        """A reset ends a pulse, which is no fault of the PWM."""
+        self.until(tick)
+        self._follow(tick)
 
     def until(self, tick: int) -> None:
         for pin, following in self.periods.items():

@@ -128,7 +128,7 @@ class Harness:
     `bit_ticks`: of the line. The machine is where it shall begin, with nothing on RXD. `sleeps`: whether its firmware
     does when it has nothing to do. `after_ticks`: how long a run goes on after its last character at least, -1 for
     what its firmware needs. `device`: who runs a machine that is no `Cpu` alone. It has `run(tick)`, which returns
-    whether it stopped, `put(which, value, tick)`, `set_reset(level)`, and `back()`, after it was put back.
+    whether it stopped, `put(which, value, tick)` and `set_reset(level)`.
     """
 
     NOT_STATE = ("*",)
@@ -180,8 +180,6 @@ class Harness:
             self.board.faults.clear()
             self.board.left.commands.clear()
             self.board.right.commands.clear()
-        if self.device is not None:
-            self.device.back()
         self.now_tick = moment.tick
         self.puts = 0
         self.oracle.begin(self.begin_tick)

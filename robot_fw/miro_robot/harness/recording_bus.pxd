@@ -16,7 +16,7 @@ cdef class RecordingBus(XramBus):
     cpdef begin(self)
 
 cdef class BareOracle(LiveOracle):
-    cdef readonly RecordingBus bus
+    cdef readonly object bus
     cdef readonly Cpu cpu
     cdef long long slept_tick
 

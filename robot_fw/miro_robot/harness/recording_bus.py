@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from typing import Any
+
 from miro_exact.clock import NEVER_TICK
 from miro_robot.harness.harness import LiveOracle
 from miro_robot.mcs51.cpu import Cpu
@@ -56,11 +58,14 @@ class RecordingBus(XramBus):
 
 
 class BareOracle(LiveOracle):
-    """Finds faults of the CPU on `bus`, and lets a run go on while the serial port sends."""
+    """Finds faults of the CPU on `bus`, and lets a run go on while the serial port sends.
+
+    `bus`: a `RecordingBus`, or a board that has `begin`, `fault_kind`, `fault_tick` and `reset_tick` like one.
+    """
 
     NOT_STATE = ("*",)
 
-    def __init__(self, bus: RecordingBus, cpu: Cpu) -> None:
+    def __init__(self, bus: Any, cpu: Cpu) -> None:
         LiveOracle.__init__(self)
         self.bus = bus
         self.cpu = cpu

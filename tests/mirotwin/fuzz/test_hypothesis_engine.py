@@ -9,7 +9,7 @@ from hypothesis import strategies as st
 
 from miro_exact.bad_input import BadInput
 from miro_robot.firmware import image_path
-from miro_robot.harness.program import INPUTS, OPERATIONS
+from miro_robot.harness.program import INPUTS, OPERATIONS, SESSION, Program
 from miro_robot.image import load_hex
 from mirotwin.fuzz import hypothesis_process
 from mirotwin.fuzz.engine import EngineInput, Explorer
@@ -113,6 +113,20 @@ def test_inputs_of_all_kinds_are_drawn(kind, foreign):
         assert draw.draw(inputs(kind, 3, 0, foreign, (data,)))
 
     is_read()
+
+
+def test_a_session_of_a_board_puts_values_and_levels_on_pins():
+    program = Program(SESSION, repair=bytes, choices=3, pins=2)
+    put = set()
+
+    @settings(max_examples=60, database=None, derandomize=True)
+    @given(inputs("session", foreign=True, puts=True))
+    def is_read(data):
+        program.read(data)
+        put.update(program.put(number)[2] for number in range(program.puts))
+
+    is_read()
+    assert min(put) < 3 <= max(put), "values, and pins behind them"
 
 
 def test_a_session_is_made_of_whole_operations():

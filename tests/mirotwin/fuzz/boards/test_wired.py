@@ -9,12 +9,13 @@ from hypothesis import strategies as st
 from miro_exact.bad_input import BadInput
 from miro_protocol.stream import parse
 from miro_sim.scenario.board_scenario import load_any
-from mirotwin.fuzz.board_target import BoardTarget
+from mirotwin.fuzz.board_target import BoardTarget, wired_target
 from mirotwin.fuzz.oracle import BoardOracle
+from mirotwin.fuzz.spec import TargetSpec
 from mirotwin.fuzz.wired import WiredMachine
 from mirotwin.shell.firmware_image import image_for
 from mirotwin.verify.steps.reading import steps_in
-from tests.mirotwin.board_files import ECHO, board_folder
+from tests.mirotwin.board_files import BOARD, ECHO, board_folder
 
 BOARDS = Path(__file__).parents[4] / "examples" / "boards"
 
@@ -150,3 +151,49 @@ def test_a_pin_with_something_wired_to_it_is_put_by_no_scenario(tmp_path):
     path.write_text(path.read_text().replace("P2.0 = 1", "P1.3 = 2"))
     with pytest.raises(BadInput, match=r"P1\.3.* is no level; use 0 or 1"):
         load_any(str(path))
+
+
+SCENARIO = """
+board = "lamp.board.toml"
+firmware = "lamp.hex"
+duration_s = 1.0
+[expect]
+value_at_most = { "lamp.flashes" = 2 }
+sends_text = "done"
+[[step]]
+pause_ms = 20
+[[step]]
+put = { key.pressed = true }
+[[step]]
+send = "text"
+text = "hi"
+"""
+
+
+def test_the_expectations_of_a_scenario_judge_each_input_but_one_that_fails_without_any(tmp_path):
+    text = load_any(str(board_folder(tmp_path, SCENARIO, BOARD.replace("bounce_ms = 3", ""))))
+    image, parameters = str(tmp_path / "lamp.hex"), {"tables": text.tables, "steps": 1}
+    target = wired_target(TargetSpec(board="wired", image=image, parameters=parameters))
+    assert [check.name for check in target.checks] == ["value_at_most"]
+    assert list(target.left_out) == ["sends_text"]
+    press, let_go, wait = b"\x01\x00\x01\x00", b"\x01\x00\x00\x00", b"\x0a\x40"
+    twice, thrice = (wait.join([press, let_go] * count) + wait for count in (1, 5))
+    assert target.run(twice) == 0
+    assert target.run(thrice) == 3
+    assert target.failure.check == "value_at_most"
+    run = BoardOracle(target, text.scenario.expect).confirm(thrice, target.failure)
+    assert run.failure.check == "value_at_most"
+    (seed,) = target.inputs_of(target.wired.played())
+    assert seed == b"\x09\x01hi" + press
+
+
+def test_a_reset_ends_no_period_of_a_pwm():
+    text = load_any(str(BOARDS / "car/stops.scenario.toml"))
+    image, parameters = str(image_for(text).path), {"tables": text.tables, "steps": 1}
+    target = wired_target(TargetSpec(board="wired", image=image, parameters=parameters))
+    go, stop, reset = b"\x09\x00g\x0b\x30", b"\x09\x00s\x0a\x80", b"\x09\x00x\x0f\x0b\x02"
+    going_again = go + stop + reset + go  # ports go high with the reset, 30 ms after the last period
+    assert target.run(going_again) == 0
+    run = BoardOracle(target, {}).judged(going_again, text.scenario.expect)
+    assert run.failure is None
+    assert run.verdict_on("pwm_at_least_hz") == "passed"
