@@ -178,7 +178,6 @@ class Ds18b20Part(Part):
             self.drive(0, LOW)
 
     def _reset(self, tick: int) -> None:
-        self.drive(0, RELEASED)
         self.phase, self.next_tick, self.reach_tick = _IDLE, _NEVER, 0
         if self.broken != _MISSING:
             self.phase = _PRESENCE

@@ -12,8 +12,6 @@ cdef class SevenSegmentPart(Part):
     cdef public long long lit[64]
     cdef public unsigned char seen[8]
 
-    @cython.locals(place=int)
-    cdef _forget(self)
     @cython.locals(on='unsigned int')
     cdef _look(self)
     @cython.locals(since='long long', digit=int, segment=int)

@@ -116,21 +116,16 @@ class SevenSegmentPart(Part):
         self.seen = [0] * 8
 
     def start(self, tick: int) -> None:
-        self._forget()
         self.last_tick = tick
         self.next_tick = tick + self.window_ticks
         self._look()
 
     def supply(self, on: int, tick: int) -> None:
-        self._forget()
-        for digit in range(_MOST_DIGITS):
-            self.seen[digit] = 0
-        Part.supply(self, on, tick)
-
-    def _forget(self) -> None:
+        """Without it nothing is seen, and what was lit before is forgotten."""
         for place in range(64):
             self.lit[place] = 0
-        self.segments = self.digits = 0
+            self.seen[place & 7] = 0
+        Part.supply(self, on, tick)
 
     def changed(self, pins: int, tick: int) -> None:
         self._gather(tick)

@@ -108,6 +108,8 @@ def test_it_refuses_to_be_asked_too_soon(keys, seconds):
 def test_one_that_is_broken_is_missed_or_sends_a_wrong_sum():
     wire = sensor()
     wire.put("chip.broken", "sum")
+    assert len(ask(wire)) == 84  # at once
+    wire.later(SECOND)
     *values, check = answer(wire)
     assert check == sum(values) ^ 0xFF
     wire.put("chip.broken", "missing")
@@ -128,7 +130,9 @@ def test_it_begins_anew_with_its_supply():
     assert wire.level("data") == 1
     wire.power(1)
     assert ask(wire) == []
+    seen = len(wire.edges_of("data"))
     wire.later(SECOND)
+    assert len(wire.edges_of("data")) == seen
     assert len(ask(wire)) == 84
 
 

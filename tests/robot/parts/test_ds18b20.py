@@ -67,7 +67,7 @@ def test_a_reset_of_480_us_is_answered_by_a_presence_pulse():
 def test_a_temperature_is_in_the_scratchpad_as_the_sheet_s_table_has_it(celsius, raw):
     wire = bus()
     convert(wire, celsius)
-    assert scratchpad(wire)[:2] == [raw & 0xFF, raw >> 8]
+    assert scratchpad(wire)[:8] == [raw & 0xFF, raw >> 8, 0x4B, 0x46, 0x7F, 0xFF, 0x0C, 0x10]
     assert (wire.value("scratchpad_c"), wire.value("conversions")) == (celsius, 1)
 
 

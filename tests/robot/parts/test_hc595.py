@@ -113,6 +113,7 @@ def test_it_begins_anew_with_its_supply():
     board.power(0)
     assert (outputs(board), board.driven("q7s")) == ([None] * 8, None)
     board.power(1)
+    assert board.driven("q7s") == 0
     board.drive("oe", 0)
     assert (outputs(board), board.read("chip.shifted")) == ([0] * 8, 0)
 

@@ -114,6 +114,20 @@ def test_the_output_is_what_was_written_last_while_it_is_on():
     assert bus.value("aout_v") == 0.0
 
 
+def test_it_begins_anew_with_its_supply():
+    bus = converter(1.0)
+    bus.write(WRITE, OUT | COUNT, 128)
+    read(bus, 3)
+    bus.start()
+    bus.power(0)
+    bus.power(1)
+    bus.later(60)
+    assert (bus.value("aout_on"), bus.value("control")) == (False, 0)
+    assert read(bus, 2) == [0x80, 51]
+    bus.write(WRITE, OUT)
+    assert bus.value("aout_v") == 0.0
+
+
 def test_address_pins_select_one_of_eight():
     bus = converter(pins=["a0", "a1", "a2"])
     bus.set(a0=1, a1=0, a2=1)

@@ -89,6 +89,10 @@ def test_a_blank_display_and_one_without_supply_show_nothing():
     multiplex(board, [0x7F] * 4)
     board.power(0)
     assert board.read("it.text") == "    "
+    board.power(1)
+    board.drive_all({net: int(net.startswith("dig")) for net in board.number})
+    board.run(board.tick + 30 * MS)
+    assert board.read("it.text") == "    "
 
 
 def test_segments_that_make_no_character_are_a_question_mark():
