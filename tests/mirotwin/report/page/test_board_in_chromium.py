@@ -4,6 +4,7 @@ from pathlib import Path
 
 import pytest
 
+from tests.mirotwin.board_files import board_folder
 from tests.mirotwin.report.page import browser
 from tests.mirotwin.report.page.browser import chromium, open_page
 
@@ -55,3 +56,23 @@ def test_all_fits_into_the_window(driver, page, theme, width):
     assert driver.execute_script("return document.documentElement.scrollWidth") == width
     said = [one["message"] for one in driver.get_log("browser")]
     assert not [one for one in said if "document idle" not in one and "setting log level" not in one]
+
+
+DIGIT = """
+crystal_hz = 11_059_200
+[parts.counter]
+part = "seven_segment"
+pins = { a = "P2.0", b = "P2.1", c = "P2.2", d = "P2.3", e = "P2.4", f = "P2.5", g = "P2.6", dp = "P2.7" }
+"""
+THREE = "MOV P2,#0CFh\nSJMP $"
+
+
+def test_digits_of_seven_segments_are_drawn_as_they_are_lit(driver, mirotwin, tmp_path):
+    lines = 'board = "lamp.board.toml"\nfirmware = "lamp.hex"\nduration_s = 0.2\n'
+    scenario = board_folder(tmp_path, lines, DIGIT, THREE)
+    mirotwin.succeeds("run", scenario, "--out", tmp_path / "run", "-q")
+    mirotwin.succeeds("report", tmp_path / "run", "-o", tmp_path / "page.html", "-q")
+    open_page(driver, tmp_path / "page.html")
+    lit = "return [...document.querySelectorAll('.digits:not([data-end]) path')].map((one) => one.matches('.lit'))"
+    driver.execute_script("run.show(run.last)")
+    assert driver.execute_script(lit) == [True, True, True, True, False, False, True, True], "3."
