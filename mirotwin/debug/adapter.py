@@ -18,6 +18,8 @@ from operator import attrgetter
 from pathlib import PureWindowsPath as AnyPath
 from typing import Any
 
+import msgspec
+
 from miro_exact.bad_input import BadInput, one_line
 from miro_exact.clock import CYCLE_TICKS
 from miro_robot.image.c_types import CType
@@ -34,7 +36,7 @@ from mirotwin.debug.wire import Message, Wire
 CAPABILITIES = (
     "ConfigurationDoneRequest", "FunctionBreakpoints", "ConditionalBreakpoints", "HitConditionalBreakpoints",
     "LogPoints", "StepBack", "SteppingGranularity", "InstructionBreakpoints", "DataBreakpoints", "DisassembleRequest",
-    "ReadMemoryRequest", "EvaluateForHovers", "TerminateRequest", "CompletionsRequest",
+    "ReadMemoryRequest", "EvaluateForHovers", "TerminateRequest", "CompletionsRequest", "SetVariable",
 )  # fmt: skip
 _WITHOUT_A_RUN = ("initialize", "launch", "disconnect", "terminate")
 _WHILE_IT_RUNS = (
@@ -424,6 +426,21 @@ class Adapter:
         there, path = self.children[reference - 1]
         shown = [(name, self._shown(get, _joined(path, name))) for name, get in there.items()]
         return {"variables": [{"name": name, **value} for name, value in shown]}
+
+    def on_setVariable(self, given: Message) -> Message:
+        """A value of a part is put; nothing else of a run can be set."""
+        path = _joined(self.children[given["variablesReference"] - 1][1], given["name"]).removeprefix(
+            "parts."
+        )
+        value = given["value"]
+        with suppress(msgspec.DecodeError):
+            value = msgspec.json.decode(value)
+        try:
+            tick = self.timeline.put(path, value)
+        except ValueError as error:
+            reason, _, remedy = f"{error}".partition("; ")
+            raise BadInput("", "", reason, remedy) from None
+        return {"value": f"{given['value']}   (from tick {tick} on)"}
 
     def _shown(self, get: Shown, path: str, key: str = "value") -> Message:
         """A value; one that is not live says so in its place."""

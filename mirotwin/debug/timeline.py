@@ -17,6 +17,7 @@ from operator import attrgetter, itemgetter
 from typing import NamedTuple
 
 from miro_exact.clock import CYCLE_TICKS, NEVER_TICK
+from miro_protocol.actions import Put, PutValue
 from miro_robot.board import Board
 from miro_robot.empty_board import EmptyBoard
 from miro_robot.event_log import EventLog
@@ -73,9 +74,12 @@ class Trap(NamedTuple):
 
 
 class _Checkpoint(NamedTuple):
+    """`puts`: how many of those of the timeline the state has done, or waits for."""
+
     tick: int
     state: bytes
     log_ends: list[int]
+    puts: int
 
 
 class Timeline:
@@ -99,6 +103,7 @@ class Timeline:
         self.focus = next(at for at, core in enumerate(self.cores) if core.cpu is run.cpu)
         self._begins = [core.cpu.cycles for core in self.cores]
         self._checkpoints: list[_Checkpoint] = []
+        self._puts: list[Put] = []
         self.kept_bytes = 0
         self._save()
 
@@ -140,7 +145,9 @@ class Timeline:
         if index < len(self._checkpoints) and self._checkpoints[index].tick == tick:
             return
         state = self.state()
-        self._checkpoints.insert(index, _Checkpoint(tick, state, [log.end for log in self._logs]))
+        self._checkpoints.insert(
+            index, _Checkpoint(tick, state, [log.end for log in self._logs], len(self._puts))
+        )
         self.kept_bytes += len(state)
         if self.kept_bytes > BUDGET_BYTES:
             del self._checkpoints[1 : len(self._checkpoints) // 2 : 2]
@@ -151,6 +158,8 @@ class Timeline:
         self._restore(checkpoint.state)
         for log, end in zip(self._logs, checkpoint.log_ends, strict=True):
             log.cut(end)
+        for put in self._puts[checkpoint.puts :]:
+            self.run.world.do(put)
         for core in self.cores:
             del core.device.board.faults[core.device.board.fault_count :]
 
@@ -166,6 +175,20 @@ class Timeline:
             while end_tick - self._now > CLOSE_TICKS and not self.run.over:
                 self._run_to((self._now + end_tick) // 2)
                 self._save()
+
+    def put(self, path: str, value: PutValue) -> int:
+        """Puts a value of a part of the board in focus as soon as possible, and forgets what came later; the tick.
+
+        Who goes back and on again finds it put. Raises ValueError.
+        """
+        device, world = self.core.device, self.run.world
+        put = Put(world.earliest_action_tick, device.network, device.slot, path, value)
+        world.do(put)
+        self._puts.append(put)
+        self._checkpoints = [one for one in self._checkpoints if one.tick < self._now]
+        self.kept_bytes = sum(len(one.state) for one in self._checkpoints)
+        self._save()
+        return put.tick
 
     # Moving
 

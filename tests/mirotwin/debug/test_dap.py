@@ -596,3 +596,38 @@ def test_a_board_has_scopes_of_its_parts_and_nets_whose_values_can_be_asked_for(
     nets = client.ask("variables", variablesReference=references["Nets"])["body"]["variables"]
     assert (nets[0]["name"], nets[0]["value"]) == ("KEY", "1")
     assert client.ask("evaluate", expression="lamp.flashes", frameId=frame)["body"]["result"] == "0"
+
+
+def test_a_value_of_a_part_that_is_set_is_put_and_stays_put_where_one_goes_back_and_on(adapter, tmp_path):
+    _, client = adapter
+    board, image = files_of_board(tmp_path)
+    client.begin(subject=f"{board}", firmware=f"{image}", at="10ms")
+
+    def part(name):
+        frame = client.ask("stackTrace", threadId=1)["body"]["stackFrames"][0]["id"]
+        scopes = {one["name"]: one for one in client.ask("scopes", frameId=frame)["body"]["scopes"]}
+        reference = scopes["Parts"]["variablesReference"]
+        parts = client.ask("variables", variablesReference=reference)["body"]["variables"]
+        return next(one["variablesReference"] for one in parts if one["name"] == name)
+
+    def lit_at(time):
+        client.ask("evaluate", expression=f"goto {time}", context="repl")
+        client.until(event="stopped")
+        return client.ask("evaluate", expression="lamp.on")["body"]["result"]
+
+    said = client.ask("setVariable", variablesReference=part("key"), name="pressed", value="true")
+    assert said["success"], said
+    assert said["body"]["value"].startswith("true   (from tick 110")
+    assert [lit_at(time) for time in ("9ms", "20ms", "1ms", "11ms", "10ms", "400ms", "20ms")] == list(
+        "0101011"
+    )
+    lit_at("30ms")
+    assert client.ask("setVariable", variablesReference=part("key"), name="pressed", value="false")["success"]
+    assert [lit_at(time) for time in ("20ms", "40ms", "5ms", "500ms")] == ["1", "0", "0", "0"]
+    for name, value, why in (
+        ("pressed", "7", "key.pressed = 7: expected `bool`, got `int`"),
+        ("closed", "true", "nothing can be put at 'closed' of part 'key'"),
+    ):
+        refused = client.ask("setVariable", variablesReference=part("key"), name=name, value=value)
+        assert not refused["success"]
+        assert why.split(":")[0] in refused["message"]

@@ -25,7 +25,11 @@ MODULES = ROOT / "build" / "npm" / "node_modules"
 HERE = Path(__file__).parent
 EXAMPLES = ROOT / "examples"
 EXTENSION = json.loads((EXAMPLES / "vscode" / "package.json").read_text())
-LAUNCH = json.loads((EXAMPLES / "hil" / ".vscode" / "launch.json").read_text())
+LAUNCHES = [
+    one
+    for project in ("hil", "boards/car")
+    for one in json.loads((EXAMPLES / project / ".vscode/launch.json").read_text())["configurations"]
+]
 VALUES = {"string": "1s", "integer": 1, "array": ["one"]}
 
 
@@ -128,7 +132,7 @@ def test_each_key_of_the_extension_is_one_that_a_launch_takes():
             assert launched({key: VALUES[about["type"]]}) != DebugSubject()
 
 
-@pytest.mark.parametrize("configuration", LAUNCH["configurations"], ids=lambda one: one["name"])
+@pytest.mark.parametrize("configuration", LAUNCHES, ids=lambda one: one["name"])
 def test_configurations_of_a_project_have_keys_that_the_extension_names(configuration):
     launch = EXTENSION["contributes"]["debuggers"][0]["configurationAttributes"]["launch"]
     assert configuration.keys() - {"type", "request", "name"} <= launch["properties"].keys()
