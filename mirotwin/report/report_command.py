@@ -115,6 +115,7 @@ def page_of(wanted: ReportOptions, name: str = "") -> bytes:
 def _ticks_of(wanted: ReportOptions, material: Material) -> tuple[int, int]:
     """The ticks of a board's run that are wanted and there. Raises BadInput."""
     from_tick, to_tick = window(wanted.from_time, wanted.to_time, material.job.spec.scenario.clock)
+    from_tick = max(from_tick, material.periods[0].tick if material.periods else 0)
     end_tick = material.again.result.tick
     if from_tick >= end_tick:
         place, reason = f"--from {from_tick}t", f"the run ends at tick {end_tick}"

@@ -64,7 +64,7 @@ def board_page(material: Material, first_tick: int, end_tick: int) -> bytes:
     curves = _together([one for one in moved if not _is_state(one)], scenario)
     wire = [one for period in material.periods for one in period.wire if first_tick <= one.tick < end_tick]
     by_path = {one.path: one for one in values}
-    cars = [_car(name, keys, by_path) for name, keys in scenario.parts.items() if hasattr(keys, "PATH")]
+    cars = [_car(name, keys, by_path) for name, keys in scenario.parts.items() if is_car(keys)]
     marks = _marks(material, wire, scenario)
     marks = [one for one in marks if first_tick <= one.end_tick and one.start_tick < end_tick]
     ticks = [*(one.tick for one in again.result.failures), *(fault.tick for _, _, fault in again.faults)]
@@ -110,6 +110,11 @@ def board_page(material: Material, first_tick: int, end_tick: int) -> bytes:
         "cars": cars,
     }
     return render("board.html", figures, json_bytes(data), sections)
+
+
+def is_car(keys: Any) -> bool:
+    """Whether a part with these keys moves on a plane."""
+    return all(hasattr(keys, key) for key in ("PATH", "walls", "lines", "picture", "cell_cm", "radius_cm"))
 
 
 class Car(NamedTuple):

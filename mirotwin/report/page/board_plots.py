@@ -12,7 +12,16 @@ import numpy as np
 from bokeh.core.properties import value
 from bokeh.models import ColumnDataSource, FixedTicker, Range1d
 
-from mirotwin.report.page.axes import FONT, ROBOT_COLOURS, SIZE, add_cursor, add_failures, panel, tagged
+from mirotwin.report.page.axes import (
+    FONT,
+    ROBOT_COLOURS,
+    SIZE,
+    add_cursor,
+    add_failures,
+    at_least,
+    panel,
+    tagged,
+)
 from mirotwin.report.page.board_watch import Changed, Wave
 from mirotwin.report.page.link import LinkMark
 from mirotwin.report.page.plots import MOST_FAILURES, lanes_figure
@@ -24,6 +33,8 @@ FINEST_S = 20e-6
 """The shortest time that fills a figure: two characters at 1 Mbaud, some instructions."""
 LABEL, LABEL_PX = 20, 136
 """Characters of a lane's name that there is room for, and that room, the same in all figures."""
+LEAST_SHARE, LEAST = 0.01, 0.001
+"""An axis of values spans so much of the greatest at least, and so much."""
 TEXT_SHARE, TEXT_ALPHA = 0.011, 0.3
 """The share of a figure's width that a character takes."""
 
@@ -119,7 +130,10 @@ def _states(states: Sequence[LinkMark], window: Window) -> Any:
 
 def _curves(together: Sequence[Changed], window: Window) -> Any:
     """Values of one kind: each holds until the next change that was seen. Of equal ones all can be seen."""
-    made = panel(together[0].path.rpartition(".")[2], window.times, height=116)
+    made = panel("", window.times, height=116)
+    everything = np.concatenate([np.array(one.values, dtype=np.float64) for one in together])
+    if (ends := at_least(max(LEAST_SHARE * np.abs(everything).max(), LEAST), everything)) is not None:
+        made.y_range = Range1d(*ends)
     for number, one in enumerate(together):
         values = np.array([*one.values, one.values[-1]], dtype=np.float64)
         source = ColumnDataSource({"t": window.seconds([*one.ticks, window.end_tick]), "value": values})

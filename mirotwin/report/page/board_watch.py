@@ -109,7 +109,7 @@ class BoardWatch:
         """All values within these ticks; the first is that at their begin."""
         found = []
         for path, (ticks, values) in self._values.items():
-            first = int(np.searchsorted(ticks, first_tick, side="right")) - 1
+            first = max(0, int(np.searchsorted(ticks, first_tick, side="right")) - 1)
             end = int(np.searchsorted(ticks, end_tick))
             kept = _thinned(values, first, end)
             since = [max(first_tick, ticks[at]) for at in kept]

@@ -23,7 +23,7 @@
     return low;
   }
 
-  const said = (value) => typeof value !== "number" ? `${value}` : Number.isInteger(value) ? `${value}` : `${Number(value.toPrecision(5))}`;
+  const said = (value) => typeof value !== "number" ? `${value}` : Number.isInteger(value) ? `${value}` : `${Math.abs(value) < 0.01 ? Number(value.toFixed(5)) : Number(value.toPrecision(5))}`;
   const valueAt = (path, tick) => {
     const [ticks, values] = data.values[path];
     return values[Math.max(0, passed(ticks, tick) - 1)];
