@@ -3,9 +3,7 @@
 from __future__ import annotations
 
 import math
-import re
-from bisect import bisect
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from itertools import pairwise
 from typing import Any, NamedTuple
 
@@ -64,7 +62,7 @@ def board_page(material: Material, first_tick: int, end_tick: int) -> bytes:
     curves = _together([one for one in moved if not _is_state(one)], scenario)
     wire = [one for period in material.periods for one in period.wire if first_tick <= one.tick < end_tick]
     by_path = {one.path: one for one in values}
-    cars = [_car(name, keys, by_path) for name, keys in scenario.parts.items() if is_car(keys)]
+    cars: dict[str, Any] = {name: keys for name, keys in scenario.parts.items() if _is_car(keys)}
     marks = _marks(material, wire, scenario)
     marks = [one for one in marks if first_tick <= one.end_tick and one.start_tick < end_tick]
     ticks = [*(one.tick for one in again.result.failures), *(fault.tick for _, _, fault in again.faults)]
@@ -88,7 +86,7 @@ def board_page(material: Material, first_tick: int, end_tick: int) -> bytes:
         "failures": sorted(set(ticks)),
         "marks": [(one.start_tick, one.lane, one.kind, one.text) for one in sorted(marks, key=_begin)],
         "values": {one.path: (one.ticks, [_plain(value) for value in one.values]) for one in values},
-        "ways": {car.name: (car.ticks, f"{car.name}.{car.keys.PATH[2]}") for car in cars},
+        "ways": {name: [f"{name}.{key}" for key in keys.PATH] for name, keys in cars.items()},
     }
     sections = {
         **shared(material, scenario.clock),
@@ -112,42 +110,9 @@ def board_page(material: Material, first_tick: int, end_tick: int) -> bytes:
     return render("board.html", figures, json_bytes(data), sections)
 
 
-def is_car(keys: Any) -> bool:
+def _is_car(keys: Any) -> bool:
     """Whether a part with these keys moves on a plane."""
     return all(hasattr(keys, key) for key in ("PATH", "walls", "lines", "picture", "cell_cm", "radius_cm"))
-
-
-class Car(NamedTuple):
-    """What moves on a plane, with the keys of its part; `points`: its way, from each of `ticks` on; all in cm, y up.
-
-    `dark`: the cells of its floor's picture, as one path of strokes.
-    """
-
-    name: str
-    keys: Any
-    view_box: str
-    ticks: list[int]
-    points: list[tuple[float, float]]
-    dark: str
-
-
-def _car(name: str, keys: Any, values: Mapping[str, Changed]) -> Car:
-    x, y, _ = (values[f"{name}.{key}"] for key in keys.PATH)
-    ticks = sorted({*x.ticks, *y.ticks})
-    points = [(x.values[bisect(x.ticks, at) - 1], y.values[bisect(y.ticks, at) - 1]) for at in ticks]
-    cell, rows = keys.cell_cm, keys.picture[::-1]
-    runs = [
-        (run.start() * cell, (row + 0.5) * cell, len(run[0]) * cell)
-        for row, text in enumerate(rows)
-        for run in re.finditer(r"[^ .-]+", text)
-    ]
-    corners = [*points, *(point for line in keys.lines for point in line)]
-    corners += [point for x1, y1, x2, y2 in keys.walls for point in ((x1, y1), (x2, y2))]
-    corners += [(0.0, 0.0), (max(map(len, rows)) * cell, len(rows) * cell)] if rows else []
-    (left, right), (bottom, top) = ((min(axis), max(axis)) for axis in zip(*corners, strict=True))
-    room = 1.2 * keys.radius_cm
-    box = f"{left - room:.2f} {-top - room:.2f} {right - left + 2 * room:.2f} {top - bottom + 2 * room:.2f}"
-    return Car(name, keys, box, ticks, points, "".join(f"M{x:g} {y:g}h{length:g}" for x, y, length in runs))
 
 
 def _is_state(one: Changed) -> bool:

@@ -52,10 +52,26 @@
     }
   }
 
+  // A car's way: its place at each tick at which one of its coordinates was another one.
   const cars = all(".plane").map((plane) => {
-    const ahead = plane.querySelector(".ahead");
-    const [ticks, heading] = data.ways[ahead.dataset.car];
-    return { ticks, heading, points: ahead.getAttribute("points").trim().split(" "), trail: plane.querySelector(".trail"), body: plane.querySelector(".car") };
+    const [x, y, heading] = data.ways[plane.dataset.car];
+    const ticks = [...new Set([...data.values[x][0], ...data.values[y][0]])].sort((one, other) => one - other);
+    const points = ticks.map((tick) => `${valueAt(x, tick)},${valueAt(y, tick)}`);
+    plane.querySelector(".ahead").setAttribute("points", points.join(" "));
+    const room = Number(plane.dataset.room);
+    const body = plane.querySelector(".car");
+    const reach = body.getBBox().width / 2;
+    let [left, bottom, right, top] = [Infinity, Infinity, -Infinity, -Infinity];
+    for (const one of plane.querySelectorAll("rect, line, polyline")) {
+      const box = one.getBBox();
+      const grown = one.matches(".ahead") ? reach : 0;
+      if (!one.matches(".trail")) {
+        [left, bottom] = [Math.min(left, box.x - grown), Math.min(bottom, box.y - grown)];
+        [right, top] = [Math.max(right, box.x + box.width + grown), Math.max(top, box.y + box.height + grown)];
+      }
+    }
+    plane.setAttribute("viewBox", `${left - room} ${-top - room} ${right - left + 2 * room} ${top - bottom + 2 * room}`);
+    return { ticks, heading, points, trail: plane.querySelector(".trail"), body };
   });
   function drive(tick) {
     for (const { ticks, points, trail, body, heading } of cars) {

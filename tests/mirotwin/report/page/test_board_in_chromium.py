@@ -76,3 +76,22 @@ def test_digits_of_seven_segments_are_drawn_as_they_are_lit(driver, mirotwin, tm
     lit = "return [...document.querySelectorAll('.digits:not([data-end]) path')].map((one) => one.matches('.lit'))"
     driver.execute_script("run.show(run.last)")
     assert driver.execute_script(lit) == [True, True, True, True, False, False, True, True], "3."
+
+
+def test_a_car_stands_where_it_was_and_all_its_way_is_in_sight(driver, mirotwin, tmp_path):
+    mirotwin.succeeds("run", ROVER.parents[1] / "car/drives.scenario.toml", "--out", tmp_path / "run", "-q")
+    mirotwin.succeeds("report", tmp_path / "run", "-o", tmp_path / "page.html", "-q")
+    open_page(driver, tmp_path / "page.html")
+    body = "return document.querySelector('.plane .car').getAttribute('transform')"
+    assert driver.execute_script(body) == "translate(40 100) rotate(0)"
+    assert (
+        driver.execute_script("return document.querySelector('.plane').getAttribute('viewBox')")
+        == "-2 -202 304 204"
+    )
+    driver.execute_script("run.show(run.last)")
+    trail, ahead = (
+        driver.execute_script(f"return document.querySelector('.{way}').getAttribute('points')")
+        for way in ("trail", "ahead")
+    )
+    assert trail == ahead
+    assert len(trail.split()) > 1000
