@@ -138,6 +138,7 @@ def run_for(options: RigOptions) -> Run:
     if saved is not None:
         world.load(saved)
     run = Run(spec, world, trace)
+    run.is_session = True  # the scenario of a test lasts a day; its case ends where the test did
     if options.boot and saved is None:
         _boot(world)
         if not (run.failures or world.faults or watched):  # every test is to see what failed

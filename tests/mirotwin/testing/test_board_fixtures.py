@@ -4,6 +4,7 @@ import re
 
 import pytest
 
+from miro_protocol import stream
 from tests.mirotwin.testing.sessions import session
 from tests.mirotwin.verify.boards.panel import DEAF, project
 from tests.mutants.sdcc import needs_sdcc
@@ -90,6 +91,8 @@ def test_what_fails_is_said_with_its_story_and_leaves_a_case(tmp_path):
     assert re.search(r"\d\.\d+ ms PC: heard 72 65 61 64 79 0D 0A", done.stdout)
     cases = list((tmp_path / "left").rglob("case.stream"))
     assert len(cases) == len([line for line in FAILS if any(word in line for word in CASES)]) + 1
+    for case in cases:
+        assert stream.read(case).header.end_tick < 11_059_200, "where the test ended, not after a day"
 
 
 def test_a_board_and_robots_are_told_apart(tmp_path):
