@@ -23,7 +23,7 @@ INPUT_BYTES = 8192
 """Longer files are no inputs."""
 QUEUES = ("corpus", "queue", "*/queue", "engine/*/queue")
 FOREIGN = (
-    ".c", ".h", ".py", ".ihx", ".hex", ".map", ".cdb", ".rst", ".toml", ".json", ".xml", ".yml", ".yaml",
+    ".c", ".h", ".py", ".ihx", ".hex", ".map", ".cdb", ".m51", ".rst", ".toml", ".json", ".xml", ".yml", ".yaml",
     ".mcap", ".stream",  # damaged ones: what is whole was recognised by its content
     ".md", ".txt", ".log", ".png", ".jpg", ".pdf", ".csv", ".vcd", ".zip", ".gz", ".info", ".lst", ".world",
 )  # fmt: skip

@@ -27,6 +27,7 @@ cdef class EmptyBoard(ProcessorBoard):
     cdef unsigned char touched[256]
     cdef readonly ChipRegisters registers
     cdef unsigned int lacking[256]
+    cdef long long lacking_cycle
 
     @cython.locals(registers=ChipRegisters, end_cycle='long long')
     cdef int _run(self, tuple addresses, long long until_tick) except -1
@@ -39,6 +40,7 @@ cdef class EmptyBoard(ProcessorBoard):
     cdef bint _say_ended(self) except -1
     cdef long long _silent_cycle(self) except -1
     cdef bint _interruptible(self) except -1
+    cdef _note_lacking(self, int address)
     cdef _begin_again(self)
     @cython.locals(registers=ChipRegisters)
     cdef int _registers_due(self) except -1

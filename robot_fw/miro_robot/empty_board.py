@@ -65,7 +65,7 @@ class EmptyBoard(ProcessorBoard):
     NOT_STATE: tuple[str, ...] = (
         *("spec", "shared", "image", "loops", "stop_at", "stop_at_end"),
         *("sent", "listening", "input_tick", "forced", "again"),
-        "lacking",
+        *("lacking", "lacking_cycle"),
         *("xram_end", "ram", "memory", "touched", "written", "wrote"),  # what `pages` are made of
     )  # fmt: skip
 
@@ -103,7 +103,8 @@ class EmptyBoard(ProcessorBoard):
         self.written = bytearray(_BYTES)  # with code_in_xram: 1 where the program has put code
         self.wrote = self.written
         self.touched = bytearray(_PAGE)
-        self.lacking = [0] * 256  # accesses to registers that the chip has not, by address
+        self.lacking = [0] * 256  # instructions that accessed registers that the chip has not, by address
+        self.lacking_cycle = 0  # of the last that was counted
         self.load(image)
         chip = CHIPS[spec.chip]
         self.cpu.inner_xram = chip.xram_bytes if spec.xram == "internal" else 0
@@ -330,15 +331,21 @@ class EmptyBoard(ProcessorBoard):
         if value >= 0:
             return value
         if not self.cpu.peripherals.observed:
-            self.lacking[address] += 1
+            self._note_lacking(address)
         return _FLOATING
 
     def extra_write(self, address: int, value: int) -> None:
         if self.registers is None or not self.registers.write(address, value):
+            self._note_lacking(address)
+
+    def _note_lacking(self, address: int) -> None:
+        """Counts an instruction once, also where a wait goes back and it is executed again."""
+        if self.cpu.cycles > self.lacking_cycle:
+            self.lacking_cycle = self.cpu.cycles
             self.lacking[address] += 1
 
     def lacking_registers(self) -> dict[int, int]:
-        """Accesses by instructions to registers that the chip has not, by address."""
+        """Instructions that accessed registers that the chip has not, by address."""
         return {address: self.lacking[address] for address in range(256) if self.lacking[address]}
 
     def receiver_on(self, tick: int) -> None:

@@ -15,6 +15,7 @@ cdef class ChipRegisters:
     cdef readonly int auxr, auxr1, other_dptr, key, watching, pause
     cdef readonly long long fed, flash_cycles, pause_end, due_cycle
     cdef readonly long long bites, first_bite
+    cdef long long last_bite
 
     cpdef clear(self)
     cpdef begin(self)
@@ -28,6 +29,8 @@ cdef class ChipRegisters:
     cdef int plan(self) except -1
     cpdef int watches(self) except -1
     cpdef int due(self) except -1
+    @cython.locals(cycles='long long')
+    cdef note_bite(self)
     cdef int end_pause(self) except -1
     cpdef hold(self)
 

@@ -49,13 +49,14 @@ class ChipRegisters:
         "pause": ("i", 0, 2),
         "pause_end": ("q", 0, LAST_CYCLE),
     }
-    NOT_STATE: tuple[str, ...] = ("cpu", "due_cycle", "bites", "first_bite")
+    NOT_STATE: tuple[str, ...] = ("cpu", "due_cycle", "bites", "first_bite", "last_bite")
 
     def __init__(self, cpu: Chip) -> None:
         self.cpu = cpu
         self.flash_cycles = 0  # in which the processor stood because of its data flash
-        self.bites = 0  # resets by the watchdog, and the tick of the first
+        self.bites = 0  # resets by the watchdog, the tick of the first, the cycle of the last
         self.first_bite = 0
+        self.last_bite = 0
         self.due_cycle = NEVER_TICK
         self.pause_end = 0
         self.clear()
@@ -137,11 +138,18 @@ class ChipRegisters:
             if cpu.cycles >= self.pause_end:
                 done = self.end_pause()
         elif self.watching and not cpu.powered_down and self.count() - self.fed >= self.period():
-            self.first_bite = self.first_bite if self.bites else 12 * cpu.cycles
-            self.bites += 1
+            self.note_bite()
             done = 1
         self.plan()
         return done
+
+    def note_bite(self) -> None:
+        """Counts it once, also where a wait goes back and it comes again."""
+        cycles = self.cpu.cycles
+        if cycles > self.last_bite:
+            self.first_bite = self.first_bite if self.bites else 12 * cycles
+            self.last_bite = cycles
+            self.bites += 1
 
     def end_pause(self) -> int:
         """2 after a reset; the data flash lets the processor go on."""

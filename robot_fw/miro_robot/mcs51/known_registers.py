@@ -66,15 +66,17 @@ def lacking_lines(chip: str, counts: Mapping[int, int]) -> Iterator[str]:
             remedy = f'chip = "{known.chips[0]}" has {"it" if known.first == known.last else "them"}'
         else:
             remedy = f"{known.families} have, and no chip here"
-        yield f"the {chip} lacks {_addresses(taken)} ({known.name}), accessed {_times(taken)}; {remedy}"
+        yield f"the {chip} lacks {_addresses(taken)} ({known.name}), accessed {times(sum(taken.values()))}; {remedy}"
     if left:
-        yield f"the {chip} lacks {_addresses(left)}, accessed {_times(left)}; they read FFh"
+        yield f"the {chip} lacks {_addresses(left)}, accessed {times(sum(left.values()))}; they read FFh"
 
 
 def _addresses(taken: Mapping[int, int]) -> str:
+    first, last = min(taken), max(taken)
+    if len(taken) > 2 and len(taken) == last - first + 1:
+        return f"{first:02X}h to {last:02X}h"
     return ", ".join(f"{address:02X}h" for address in sorted(taken))
 
 
-def _times(taken: Mapping[int, int]) -> str:
-    count = sum(taken.values())
+def times(count: int) -> str:
     return "once" if count == 1 else f"{count} times"

@@ -5,7 +5,6 @@ from __future__ import annotations
 from collections.abc import Callable, Sequence
 from typing import Any
 
-from miro_exact.bad_input import amount
 from miro_exact.clock import CHARACTER_BITS, CYCLE_TICKS
 from miro_exact.state import TICK
 from miro_protocol.actions import PutValue, ScriptItem
@@ -14,7 +13,7 @@ from miro_robot.build import board_of
 from miro_robot.empty_board import EmptyBoard
 from miro_robot.image import Image
 from miro_robot.mcs51.cpu import STOPPED
-from miro_robot.mcs51.known_registers import lacking_lines
+from miro_robot.mcs51.known_registers import lacking_lines, times
 from miro_robot.parts.netlist import Netlist
 from miro_robot.parts.values import checked_put, checked_read
 from miro_robot.parts.wire_part import WirePart
@@ -65,8 +64,8 @@ class BoardAlone(Device):
         registers = board.registers
         if registers is not None and registers.bites:
             first_s = registers.first_bite / board.spec.crystal_hz
-            count = amount(registers.bites, "time")
-            lines.append(f"the watchdog reset the processor {count}, first at {first_s:.4f} s")
+            first = f"first at {first_s:.4f} s"
+            lines.append(f"the watchdog reset the processor {times(registers.bites)}, {first}")
         return lines
 
     def check_put(self, path: str, value: PutValue) -> None:

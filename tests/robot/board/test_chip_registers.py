@@ -233,6 +233,22 @@ def test_what_the_chip_lacks_is_counted_by_address_and_not_what_looks_at_it():
     assert made.lacking_registers() == {0xC8: 1}
 
 
+def test_what_is_executed_again_is_counted_once():
+    made = board("at89c52", [("wait", 20), ("write", 0xE1, 1), ("wait", 20)])
+    made.run(12 * 10)
+    before = snapshot(made)
+    for _ in range(3):
+        restore(made, before)
+        made.run(12 * 30)
+    assert made.lacking_registers() == {0xE1: 1}
+    made = board(AT, feed())
+    before = snapshot(made)
+    for _ in range(3):
+        restore(made, before)
+        made.run(12 * 20_000)
+    assert made.registers.bites == 1
+
+
 def runs():
     """The states of both chips at many ticks."""
     digest = hashlib.sha256()

@@ -23,8 +23,9 @@ def test_no_register_stands_in_the_table_twice():
 
 
 def test_a_line_names_registers_count_and_remedy():
-    lines = list(lacking_lines("at89c51", {0xC8: 2, 0xCB: 3, 0xE1: 1}))
+    lines = list(lacking_lines("at89c51", {0xC8: 2, 0xCB: 3, 0xE1: 1, 0xE2: 1, 0xE3: 1, 0xE4: 1}))
     assert lines == [
         'the at89c51 lacks C8h, CBh (timer 2), accessed 5 times; chip = "at89c52" has them',
         'the at89c51 lacks E1h (WDT_CONTR, the watchdog), accessed once; chip = "stc89c52" has it',
+        'the at89c51 lacks E2h to E4h (ISP/IAP, the data flash), accessed 3 times; chip = "stc89c52" has them',
     ]
