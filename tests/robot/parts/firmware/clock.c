@@ -1,5 +1,5 @@
 /* Minutes and seconds on four digits, a thousand digits a second by timer 2. 11.0592 MHz; begins at 12:34.
- * Two 74HC595 in a row: digits, then segments. With -DPORTS segments on P0, digits on P2.0 to P2.3 by transistors. */
+ * Two 74HC595 in a row: digits, then segments; with -DMODE0 by the serial port. With -DPORTS segments on P0, digits on P2.0 to P2.3 by transistors. */
 #include <8052.h>
 
 #define SER P1_0
@@ -22,6 +22,12 @@ static void light(unsigned char segments, unsigned char digit)
 #else
 static void shift(unsigned char value)
 {
+#ifdef MODE0
+    TI = 0;
+    SBUF = value;
+    while (!TI) {
+    }
+#else
     unsigned char i;
     for (i = 8; i; i--) {
         SER = value >> 7;
@@ -29,6 +35,7 @@ static void shift(unsigned char value)
         SRCLK = 0;
         value <<= 1;
     }
+#endif
 }
 
 static void light(unsigned char segments, unsigned char digit)
