@@ -7,7 +7,7 @@ for ever, 10 ms (at 24 MHz) after the last character, unless a time is given.
 from __future__ import annotations
 
 from collections.abc import Iterable, Sequence
-from operator import attrgetter
+from operator import itemgetter
 from typing import Any
 
 from msgspec.structs import replace
@@ -25,7 +25,7 @@ from miro_robot.harness.recording_bus import LONGEST_ANSWER_TICKS
 from miro_robot.image import SPACE_BYTES, Image
 from miro_robot.mcs51.chips import CHIPS
 from miro_sim.scenario.board_scenario import board_of_tables
-from miro_sim.world.events import Event
+from miro_sim.world.events import PC, Event
 from mirotwin.fuzz.inputs import RESET, SILENCE, raw, waited
 from mirotwin.fuzz.processor import BOOT_MS, bit_ticks_of, powered
 from mirotwin.fuzz.protocols import called, protocol_named, shown
@@ -51,7 +51,7 @@ _BITS = (b"\0\0", b"\x01\0", b"\xff\x7f", b"\xfe\xff", b"\xff\xff")
 UNHEARD_BAUD = 9600
 """Of characters to firmware that does not listen: what parts say is all that it goes by."""
 _SEEN = ("received", "transmitted")
-_BY_TICK = attrgetter("tick")
+_BY_TICK = itemgetter(0)
 
 
 class BoardTarget(Target):
@@ -158,26 +158,29 @@ class BoardTarget(Target):
         return Failure(check.name, 0, 0, self.end_tick(), "", raised(error), alone_hz=hertz)
 
     def _feed(self, monitor: Any) -> None:
-        """Tells a monitor what the serial port took and gave in the last run, and of the last reset."""
+        """Tells a monitor what the serial port took and gave in the last run, and when RST went up and down."""
         bus = self.bus
+        happened: list[tuple[int, Event | None]] = [
+            (tick - before, None) for tick in bus.resets for before in (RESET_TICKS, 0)
+        ]
         # Without events where it can be: they take longer to make than a short run.
         if type(monitor).event is SerialMonitor.event:
             monitor.received = [Character(value, tick, bool(stop)) for value, stop, tick in bus.heard]
             monitor.sent = [Character(value, tick) for value, tick in bus.said]
         elif monitor.EVENTS:
-            events = [
-                Event(tick=tick, what="received", slot=0, value=value, good_stop=bool(stop))
-                for value, stop, tick in bus.heard
-            ]
-            events += [Event(tick=tick, what="transmitted", slot=0, value=value) for value, tick in bus.said]
-            to_pc = getattr(bus, "to_pc", ())  # of a board with parts
-            events += [Event(tick=tick, what="heard", value=value) for value, tick in to_pc]
-            for event in sorted(events, key=_BY_TICK):
-                if event.what in monitor.EVENTS:
-                    monitor.event(event)
-        if bus.reset_tick >= 0:
-            monitor.restarted(bus.reset_tick - RESET_TICKS)  # its pin goes up, and down
-            monitor.restarted(bus.reset_tick)
+            for value, stop, tick in bus.heard:
+                event = Event(tick=tick, what="received", slot=0, value=value, good_stop=bool(stop))
+                happened.append((tick, event))
+            sent = (("transmitted", 0, bus.said), ("heard", PC, getattr(bus, "to_pc", ())))
+            for what, slot, characters in sent:
+                happened += [
+                    (tick, Event(tick=tick, what=what, slot=slot, value=value)) for value, tick in characters
+                ]
+        for tick, one in sorted(happened, key=_BY_TICK):
+            if one is None:
+                monitor.restarted(tick)
+            elif one.what in monitor.EVENTS:
+                monitor.event(one)
 
     def _awake(self) -> int:
         """Firmware that waits for its transmitter is awake, and no worse for it: as long as it sends, it may go on."""

@@ -90,7 +90,7 @@ class WiredMachine:
         pins = self.board.nets.netlist.free_pins() if isinstance(self.board, WiredBoard) else []
         self.choices = [*values, *((pin, _level) for pin in pins)]
         self.to_pc: list[tuple[int, int]] = []
-        self.reset_tick = -1
+        self.resets: list[int] = []
         self.bus = self  # it keeps what the serial port did, as a `RecordingBus` does
         self.oracle = BareOracle(self, self.cpu)
         self.cpu.rxd.settled_tick = NEVER_TICK
@@ -144,7 +144,7 @@ class WiredMachine:
         board.faults.clear()
         board.log.cut(0)
         self.to_pc.clear()
-        self.reset_tick = -1
+        self.resets.clear()
         self.device.put_stopped = 0
         if isinstance(board, WiredBoard):
             board.starved.clear()

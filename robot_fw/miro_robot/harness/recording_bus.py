@@ -24,7 +24,7 @@ class RecordingBus(XramBus):
     value, tick of TI.
     """
 
-    NOT_STATE = ("cpu", "heard", "said", "fault_kind", "fault_pc", "fault_tick", "reset_tick")
+    NOT_STATE = ("cpu", "heard", "said", "fault_kind", "fault_pc", "fault_tick", "resets")
 
     def __init__(self) -> None:
         XramBus.__init__(self)
@@ -38,7 +38,7 @@ class RecordingBus(XramBus):
         self.heard: list[tuple[int, int, int]] = []
         self.said: list[tuple[int, int]] = []
         self.fault_kind = 0
-        self.reset_tick = -1  # of the last reset, -1 without one
+        self.resets: list[int] = []  # when the reset pin went down
 
     def byte_received(self, value: int, stop: int, tick: int) -> None:
         if len(self.heard) < _KEPT:
@@ -60,7 +60,7 @@ class RecordingBus(XramBus):
 class BareOracle(LiveOracle):
     """Finds faults of the CPU on `bus`, and lets a run go on while the serial port sends.
 
-    `bus`: a `RecordingBus`, or a board that has `begin`, `fault_kind`, `fault_tick` and `reset_tick` like one.
+    `bus`: a `RecordingBus`, or a board that has `begin`, `fault_kind`, `fault_tick` and `resets` like one.
     """
 
     NOT_STATE = ("*",)
@@ -77,7 +77,7 @@ class BareOracle(LiveOracle):
         self.bus.begin()
 
     def restarted(self, tick: int) -> None:
-        self.bus.reset_tick = tick
+        self.bus.resets.append(tick)
 
     def look(self, tick: int) -> None:
         if self.bus.fault_kind and self.code == 0:

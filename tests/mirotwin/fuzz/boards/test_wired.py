@@ -192,7 +192,7 @@ def test_a_reset_ends_no_period_of_a_pwm():
     image, parameters = str(image_for(text).path), {"tables": text.tables, "steps": 1}
     target = wired_target(TargetSpec(board="wired", image=image, parameters=parameters))
     go, stop, reset = b"\x09\x00g\x0b\x30", b"\x09\x00s\x0a\x80", b"\x09\x00x\x0f\x0b\x02"
-    going_again = go + stop + reset + go  # ports go high with the reset, 30 ms after the last period
+    going_again = (go + stop + reset) * 2 + go  # ports go high with the reset, 30 ms after the last period
     assert target.run(going_again) == 0
     run = BoardOracle(target, {}).judged(going_again, text.scenario.expect)
     assert run.failure is None
