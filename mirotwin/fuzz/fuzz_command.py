@@ -22,7 +22,7 @@ from miro_exact.plugins import PluginError
 from miro_robot.harness.harness import AWAKE_TICKS
 from miro_robot.image import FLASH_BYTES, SPACE_BYTES, Image
 from miro_robot.mcs51.opcodes import SFRS
-from miro_sim.scenario.board_scenario import BoardText, is_board, load_any
+from miro_sim.scenario.board_scenario import BoardText, check_single, is_board, load_any
 from miro_sim.scenario.file import changed
 from mirotwin.firmware.bare_options import BAUD, CRYSTAL
 from mirotwin.firmware.code_place import address_of
@@ -253,6 +253,7 @@ def _fuzz_board(options: FuzzOptions) -> int:
     if not isinstance(text, BoardText):
         remedy = "give a board, or fuzz the robot by `mirotwin fuzz IMAGE.ihx`"
         raise BadInput(source, "", "is a scenario of robots", remedy)
+    check_single(text.scenario, source, "fuzzing")
     expectations_in(text)
     steps = steps_in(text)
     leading = len(list(takewhile(lambda step: not step.CHANGES or step.VERB == "pause_ms", steps)))

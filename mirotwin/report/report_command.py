@@ -11,6 +11,8 @@ from msgspec.structs import replace
 from miro_exact.bad_input import BadInput, amount
 from miro_exact.inputs import read_input, replace_file
 from miro_robot.image import Image
+from miro_sim.scenario.board import BoardScenario
+from miro_sim.scenario.board_scenario import check_single
 from mirotwin.recording.compare import CompareRule, differences
 from mirotwin.report.page.board_page import board_page
 from mirotwin.report.page.bokeh_page import require_bokeh
@@ -104,6 +106,8 @@ def page_of(wanted: ReportOptions, name: str = "") -> bytes:
     """
     file = _file_of(wanted.subject)
     job = load_job(file, wanted.firmware)
+    if isinstance(job.spec.scenario, BoardScenario):
+        check_single(job.spec.scenario, str(file), "a page")
     window(wanted.from_time, wanted.to_time, job.spec.scenario.clock)
     complain(*job.notes)
     if job.origin:

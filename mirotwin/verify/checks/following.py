@@ -22,7 +22,8 @@ def unknown_source(condition: object, scenario: BoardScenario) -> str:
     """Why a board cannot show what a condition names, as `key: what; remedy`, or the empty string."""
     try:
         if isinstance(condition, OfPin):
-            find_pin(scenario.board, resolve(scenario.board), condition.pin)
+            board, pin = scenario.at(condition.pin)
+            find_pin(board, resolve(board), pin)
         elif isinstance(condition, Value):
             checked_read(scenario.parts, condition.of)
     except ValueError as error:
@@ -41,7 +42,10 @@ class Following:
         self.condition = condition
         self.clock = subject.clock
         self.begin_tick = begin_tick
-        self.changes: Any = getattr(subject.device, "changes", None)
+        self.changes: Any = None
+        name = condition.source if isinstance(condition, OfPin | Value) else ""
+        if hasattr(subject.device, "source"):
+            self.changes, name = subject.device.source(name)
         self.unseen = ""
         self.text: list[tuple[int, Any, Any]] = []
         self.follower: Follower | None = None
@@ -51,13 +55,13 @@ class Following:
         elif self.changes is None:
             self.unseen = NO_NETS
         elif isinstance(condition, OfPin):
-            self.place = self.changes.find(condition.pin)
+            self.place = self.changes.find(name)
         elif isinstance(condition, Value):
             now = subject.cpu.cycles * CYCLE_TICKS
-            value = self.changes.watch_value(condition.of, now)
+            value = self.changes.watch_value(name, now)
             self.serial = self.changes.values.end
             try:
-                self.follower = condition.follower(condition.of, 0, self.clock, now, value)
+                self.follower = condition.follower(name, 0, self.clock, now, value)
             except ValueError as error:  # a text is no number
                 what, _, remedy = f"{error}".partition("; ")
                 raise PluginError(what, remedy) from None

@@ -318,9 +318,11 @@ class Player:
         for step in self.steps:
             condition = getattr(step, "condition", None)
             if isinstance(condition, OfPin) and "board" in condition.SUBJECTS:
-                changes = self.machine.device(condition.network).changes if not self.hosts else None
+                changes, pin = (
+                    (None, "") if self.hosts else self.machine.device(condition.network).source(condition.pin)
+                )
                 if changes is not None:
-                    changes.find(condition.pin)
+                    changes.find(pin)
 
     # What was found
 

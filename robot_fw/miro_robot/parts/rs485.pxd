@@ -5,9 +5,12 @@ cdef int _DE, _CONTENTION
 
 
 cdef class Rs485Part(WirePart):
-    cdef public int driving
+    cdef public int driving, broken
     cdef public long long begun_tick, ended_tick
-    cdef public list sent
+    cdef public list sent, switched, meetings
+    cdef readonly list names
+    cdef readonly int slot
+    cdef readonly long long delay_ticks
 
     cpdef changed(self, unsigned int pins, long long tick)
     @cython.locals(driving=int)

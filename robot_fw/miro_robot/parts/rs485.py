@@ -6,6 +6,9 @@ RO <──<|── A/B
 
 from __future__ import annotations
 
+from typing import Any
+
+from miro_exact.clock import NEVER_TICK
 from miro_exact.state import FLAG, TICK, Rows
 from miro_robot.faults import FaultKind
 from miro_robot.parts.keys import PartKeys, Pin, Place
@@ -22,8 +25,10 @@ class Rs485(PartKeys, frozen=True, kw_only=True, tag="rs485"):
 
     PINS = (Pin("di"), Pin("ro"), Pin("de"), Pin("re", optional=True, level=0))
     AT = {"di": "P3.1", "ro": "P3.0"}
+    PUTS = {"broken": bool}
     READS = {
-        "driving": "whether it drives the bus: DE is high",
+        "broken": "whether its wire to the bus is broken",
+        "driving": "whether it drives the bus: DE is high, and the wire whole",
         "drove_us": "for how long it drove the bus last, up to now if it still does",
         "lost": "characters of the processor that did not come through: DE was low, or both ends drove",
     }
@@ -34,14 +39,31 @@ class Rs485(PartKeys, frozen=True, kw_only=True, tag="rs485"):
 
 
 class Rs485Part(WirePart):
-    """`driving` since `begun_tick`, or until `ended_tick`. `sent`: from when to when the PC sends, the last 64."""
+    """`driving` since `begun_tick`, or until `ended_tick`. `sent`: from when to when the PC sends, the last 64.
 
-    STATE = {"driving": FLAG, "begun_tick": TICK, "ended_tick": TICK, "sent": Rows(_MOST_SENT, TICK, TICK)}
+    On a bus of several boards, `names`: `switched`: when its driver went on or off, until the bus takes that;
+    `meetings`: when it gets known whose driver was on already.
+    """
+
+    STATE = {
+        "driving": FLAG,
+        "broken": FLAG,
+        "begun_tick": TICK,
+        "ended_tick": TICK,
+        "sent": Rows(_MOST_SENT, TICK, TICK),
+        "switched": Rows(1 << 20, TICK, FLAG),
+        "meetings": Rows(1 << 20, TICK, ("B", 0, 15)),
+    }
+    NOT_STATE = ("names", "slot", "delay_ticks")
 
     def __init__(self, keys: Rs485, place: Place) -> None:
         WirePart.__init__(self, keys, place)
-        self.driving = self.begun_tick = self.ended_tick = 0
+        self.driving = self.broken = self.begun_tick = self.ended_tick = 0
         self.sent: list[tuple[int, int]] = []
+        self.switched: list[tuple[int, int]] = []
+        self.meetings: list[tuple[int, int]] = []
+        self.names: list[str] = []
+        self.slot = self.delay_ticks = 0
 
     def supply(self, on: int, tick: int) -> None:
         WirePart.supply(self, on, tick)
@@ -51,11 +73,17 @@ class Rs485Part(WirePart):
         if pins >> _DE & 1:
             self._switch(tick)
 
+    def put(self, name: str, value: Any, tick: int) -> None:
+        self.broken = 1 if value else 0
+        self._switch(tick)
+
     def _switch(self, tick: int) -> None:
-        driving = 1 if self.on and self.level(_DE) else 0
+        driving = 1 if self.on and not self.broken and self.level(_DE) else 0
         if driving == self.driving:
             return
         self.driving = driving
+        if self.names:
+            self.switched.append((tick, driving))
         if driving:
             self.begun_tick = tick
             if any(first <= tick < end for first, end in self.sent):
@@ -65,6 +93,31 @@ class Rs485Part(WirePart):
             began = [first for first, _ in self.sent if self.begun_tick < first < tick]
             if began:  # the PC, meanwhile
                 self._contend(tick - began[0])
+
+    # Several boards
+
+    def join(self, names: list[str], slot: int, delay_ticks: int) -> None:
+        """It is on a bus of boards with these `names`, as that in `slot`."""
+        self.names, self.slot, self.delay_ticks = names, slot, delay_ticks
+        self.switched = [(0, self.driving)] if self.driving else []
+
+    def take(self, end_tick: int) -> list[tuple[int, int]]:
+        """When its driver went on or off before `end_tick`, once."""
+        taken = [change for change in self.switched if change[0] < end_tick]
+        self.switched = self.switched[len(taken) :]
+        return taken
+
+    def meet(self, tick: int, other: int) -> None:
+        """At `tick` it gets known that the driver of the board in slot `other` was on as this one went on."""
+        self.meetings.append((tick, other))
+        self.next_tick = self.meetings[0][0]
+
+    def due(self, tick: int) -> None:
+        names = [self.names[other] for _, other in self.meetings[:1]]
+        self.meetings = self.meetings[1:]
+        self.next_tick = self.meetings[0][0] if self.meetings else NEVER_TICK
+        detail = f"bus: {self.names[self.slot]}.{self.name} and that of {names[0]} both drive"
+        self.fault(_CONTENTION, detail, 0, self.delay_ticks)
 
     def _contend(self, ago: int) -> None:
         self.fault(_CONTENTION, f"bus of {self.name}: {self.name} and the PC both drive", 0, ago)
@@ -79,11 +132,11 @@ class Rs485Part(WirePart):
 
     def takes(self, first_tick: int, end_tick: int, characters: int) -> bool:
         self.sent = [*self.sent[1 - _MOST_SENT :], (first_tick, end_tick)]
-        return bool(self.on)
+        return bool(self.on and not self.broken)
 
     def read(self, name: str, tick: int) -> float | int | bool | str:
-        if name == "driving":
-            return bool(self.driving)
+        if name in ("driving", "broken"):
+            return bool(self.driving if name == "driving" else self.broken)
         if name == "drove_us":
             return 1e6 * ((tick if self.driving else self.ended_tick) - self.begun_tick) / self.crystal_hz
         return self.lost

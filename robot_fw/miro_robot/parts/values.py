@@ -54,6 +54,9 @@ def checked_put(parts: Parts, path: str, value: Any) -> tuple[str, str, Any]:
 
 def _part_of(parts: Parts, path: str) -> tuple[str, str, PartKeys]:
     name, dot, key = path.partition(".")
+    if name not in parts and path.count(".") > 1:  # of several boards: BOARD.PART.KEY
+        board, name, key = path.split(".", 2)
+        name = f"{board}.{name}"
     if not dot or not key:
         raise ValueError(f"{path!r} is not PART.KEY; name a part and its value, such as eyes.distance_cm")
     if not parts:

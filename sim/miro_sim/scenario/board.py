@@ -22,6 +22,17 @@ FASTEST_BIT_TICKS = 32
 """A bit of the fastest receiver there is: mode 2 with SMOD."""
 
 
+MOST_BOARDS = 15
+"""On one line."""
+
+
+class OtherBoard(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_only=True):
+    """One more board on the line. `image`: its firmware, as Intel HEX."""
+
+    board: BoardSpec
+    image: str
+
+
 class BoardScenario(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_only=True):
     """`board` on a wire. A tick is a period of its crystal.
 
@@ -29,7 +40,8 @@ class BoardScenario(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_
     board's baud, or else those of its receiver. `duration_ticks`: default, without end. `stop_at`: the run stops before
     an instruction at one of these addresses; `stop_at_end`: when the program has ended; `stop_on_fault`: at the first
     firmware fault. `begin_tick`: the firmware has started up, and is judged from then on. `put`: values of parts at
-    power-on, by PART.KEY. `step`: what is done during the run, as of a scenario of robots.
+    power-on, by PART.KEY. `step`: what is done during the run, as of a scenario of robots. `others`: more boards on the
+    same line, in the order of their names, after `board_name`; then paths and pins have a board's name in front.
     Raises ValueError for values out of range, and for a value that no part takes.
     """
 
@@ -46,6 +58,8 @@ class BoardScenario(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_
     put: dict[str, PutValue] = {}
     expect: dict[str, Any] = {}
     step: tuple[dict[str, Any], ...] = ()
+    board_name: str = ""
+    others: dict[str, OtherBoard] = {}
     period_ticks: ClassVar[int] = PERIOD_TICKS
     """From one digest to the next."""
 
@@ -57,7 +71,8 @@ class BoardScenario(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_
         if not 0 <= self.begin_tick <= LATEST_BEGIN_TICK:
             raise ValueError(f"begin_tick {self.begin_tick} is outside 0..{LATEST_BEGIN_TICK}")
         for path, value in self.put.items():
-            checked_put(self.parts, path, value)
+            board, own = self.at(path)
+            checked_put({name: part.keys for name, part in board.parts.items()}, own, value)
 
     @property
     def host_bit_ticks(self) -> int:
@@ -69,8 +84,24 @@ class BoardScenario(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_
 
     @property
     def parts(self) -> dict[str, PartKeys]:
-        """The keys of the board's parts, by name."""
-        return {name: part.keys for name, part in self.board.parts.items()}
+        """The keys of the parts, by name; of several boards, with the board's name in front."""
+        if not self.others:
+            return {name: part.keys for name, part in self.board.parts.items()}
+        return {
+            f"{board}.{name}": part.keys
+            for board, spec in self.boards.items()
+            for name, part in spec.parts.items()
+        }
+
+    @property
+    def boards(self) -> dict[str, BoardSpec]:
+        """All boards by their names, in the order of these."""
+        return {self.board_name: self.board, **{name: one.board for name, one in self.others.items()}}
+
+    def at(self, path: str) -> tuple[BoardSpec, str]:
+        """The board of the name of a pin, and what the pin is called there."""
+        name, _, rest = path.partition(".")
+        return (self.boards[name], rest) if self.others and name in self.boards else (self.board, path)
 
     @property
     def clock(self) -> int:

@@ -8,6 +8,13 @@
     [expect]
     [[step]]
 
+Several boards on one line have a table each instead of `board`; paths and pins then have the board's name in front:
+
+    [board.panel]
+    file = "panel.board.toml"
+    firmware = "panel.ihx"
+    straps = { .. }
+
 `scenario = ".."` with `set` (`base`) and settings work as for robots. What is read is a whole scenario: its board is a
 table, and it depends on no other file.
 """
@@ -24,16 +31,17 @@ import msgspec
 from msgspec import Meta
 from msgspec.structs import replace
 
-from miro_exact.bad_input import BadInput, did_you_mean
+from miro_exact.bad_input import BadInput, amount, did_you_mean
 from miro_exact.clock import ticks
 from miro_exact.inputs import path_beside
 from miro_protocol.toml_text import TomlError, check_numbers, struct_of
 from miro_robot.board_spec import BoardSpec
-from miro_robot.parts.resolve import resolve
+from miro_robot.image import load_hex
+from miro_robot.parts.resolve import NAME, resolve
 from miro_robot.parts.values import checked_put, leaves
 from miro_sim.scenario import file as robots_file
 from miro_sim.scenario.base import SCENARIO, is_path, with_base
-from miro_sim.scenario.board import BoardScenario
+from miro_sim.scenario.board import MOST_BOARDS, BoardScenario, OtherBoard
 from miro_sim.scenario.board_file import ENDING, board_of_table, builtin_boards, load_board, table_of
 from miro_sim.scenario.errors import ScenarioError
 from miro_sim.scenario.file import ReadText, ScenarioText, builtin_names, source_text, tables_of
@@ -59,6 +67,19 @@ class _File(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_only=Tru
     step: tuple[Table, ...] = ()
     bit_ticks: int = 0
     begin_tick: int = 0
+
+
+class _OnLine(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_only=True):
+    """One of several boards: its `file` or its whole table, and its `firmware`, which is read into `image`.
+
+    That of the first board is the scenario's own.
+    """
+
+    file: str = ""
+    board: Table = {}
+    firmware: str = ""
+    image: str = ""
+    straps: dict[str, Annotated[int, Meta(ge=0, le=1)]] = {}
 
 
 class BoardText(ReadText, frozen=True, kw_only=True):
@@ -115,6 +136,11 @@ def tables_of_board(scenario: BoardScenario) -> Table:
         "put": dict(scenario.put),
         BOARD: table_of(scenario.board),
     }
+    if scenario.others:
+        others = {
+            name: {BOARD: table_of(one.board), "image": one.image} for name, one in scenario.others.items()
+        }
+        every[BOARD] = {scenario.board_name: {BOARD: table_of(scenario.board)}, **others}
     return {key: value for key, value in every.items() if value not in ("", 0, {}) or value is False}
 
 
@@ -135,9 +161,35 @@ def _complete(raw: Table, origin: str) -> Table:
     elif not isinstance(board, dict):
         what = f"expected a path, a name or a table, got {board!r}"
         raise ScenarioError(origin, BOARD, what, 'write board = "NAME.board.toml"')
+    elif _is_line(board):
+        complete[BOARD] = {name: _on_line(origin, name, board[name], complete) for name in sorted(board)}
     if origin:
         complete.setdefault("name", _name_of(origin))
     return complete
+
+
+def _is_line(board: Table) -> bool:
+    """Whether these are several boards on one line, each in a table of its name."""
+    return bool(board) and all(
+        isinstance(one, dict) and ("file" in one or BOARD in one) for one in board.values()
+    )
+
+
+def _on_line(origin: str, name: str, table: Table, scenario: Table) -> Table:
+    """One of several boards without other files; the image of the first is the scenario's."""
+    place = f"{BOARD}.{name}"
+    with ScenarioError.at(origin, place):
+        one = struct_of(table, _OnLine)
+    complete: Table = {BOARD: _board_table(origin, one.file) if one.file else one.board, "image": one.image}
+    if one.straps:
+        complete["straps"] = one.straps
+    if one.firmware:
+        path = _beside(origin, f"{place}.{FIRMWARE}", one.firmware)
+        if name == min(scenario[BOARD]):
+            scenario.setdefault(FIRMWARE, path)
+        else:
+            complete["image"] = load_hex(path).content.decode("latin-1")
+    return {key: value for key, value in complete.items() if value != ""}
 
 
 def _board_table(origin: str, board: str) -> Table:
@@ -182,10 +234,17 @@ def _scenario(raw: Table, origin: str) -> BoardScenario:
             file = struct_of(raw, _File)
         except TomlError as error:
             raise _explained(error, origin) from None
-        with ScenarioError.at("", BOARD):
-            board = board_of_table(file.board, "")
+        others: dict[str, OtherBoard] = {}
+        name = ""
+        if _is_line(file.board):
+            name, board, others = _line(file.board)
+            if file.straps:
+                raise BadInput("", "straps", "there are several boards", f"write board.{name}.straps")
+        else:
+            with ScenarioError.at("", BOARD):
+                board = board_of_table(file.board, "")
         board = _strapped(board, file.straps)
-        put = _puts(board, file.put)
+        put = _puts(board, file.put) if not others else _puts_on_line(name, board, others, file.put)
         duration_ticks = max(1, ticks(file.duration_s, board.crystal_hz))
         try:
             return BoardScenario(
@@ -199,9 +258,59 @@ def _scenario(raw: Table, origin: str) -> BoardScenario:
                 put=put,
                 expect=file.expect,
                 step=file.step,
+                board_name=name,
+                others=others,
             )
         except ValueError as error:
             raise BadInput("", "", f"{error}") from None
+
+
+def _line(tables: Table) -> tuple[str, BoardSpec, dict[str, OtherBoard]]:
+    """The first board, by its name, and the others. Raises BadInput."""
+    boards: dict[str, BoardSpec] = {}
+    images: dict[str, str] = {}
+    for name in sorted(tables):
+        place = f"{BOARD}.{name}"
+        with ScenarioError.at("", place):
+            if not NAME.fullmatch(name):
+                raise BadInput(
+                    "", "", "cannot be the name of a board", "use letters, digits and _, not a digit first"
+                )
+            one = struct_of(tables[name], _OnLine)
+            with ScenarioError.at("", BOARD):
+                spec = board_of_table(one.board, "", name)
+            boards[name], images[name] = _strapped(spec, one.straps), one.image
+            if boards and not images[name] and name != min(tables):
+                raise BadInput("", FIRMWARE, "no firmware is named", 'write firmware = "IMAGE.hex"')
+    first = min(boards)
+    for name, board in boards.items():
+        if board.crystal_hz != boards[first].crystal_hz:
+            what = f"{board.crystal_hz} Hz, and {first} has {boards[first].crystal_hz} Hz"
+            remedy = (
+                "boards on one line need one crystal: give both the same, and each its baud rate for that"
+            )
+            raise BadInput("", f"{BOARD}.{name}.crystal_hz", what, remedy)
+    if not 2 <= len(boards) <= MOST_BOARDS:
+        what = f"{amount(len(boards), 'board')} on one line"
+        raise BadInput("", BOARD, what, f'give 2 to {MOST_BOARDS}, or board = ".." for one')
+    others = {
+        name: OtherBoard(board=board, image=images[name]) for name, board in boards.items() if name != first
+    }
+    return first, boards[first], others
+
+
+def _puts_on_line(name: str, board: BoardSpec, others: dict[str, OtherBoard], table: Table) -> Table:
+    """As `_puts`, of several boards, whose names come first."""
+    puts: Table = {}
+    boards = {name: board, **{other: one.board for other, one in others.items()}}
+    for path, value in leaves(table):
+        one, _, rest = path.partition(".")
+        if one not in boards:
+            remedy = did_you_mean(one, boards, f"the boards are {', '.join(boards)}")
+            raise BadInput("", f"put.{path}", f"there is no board {one!r}", remedy)
+        with ScenarioError.at("", f"put.{one}"):
+            puts.update({f"{one}.{own}": taken for own, taken in _puts(boards[one], {rest: value}).items()})
+    return puts
 
 
 def _explained(error: TomlError, origin: str) -> BadInput:
@@ -239,6 +348,13 @@ def _puts(board: BoardSpec, table: Table) -> dict[str, Any]:
             reason, _, remedy = f"{error}".removeprefix(f"{path}: ").partition("; ")
             raise BadInput("", f"put.{path}", reason, remedy) from None
     return puts
+
+
+def check_single(scenario: BoardScenario, origin: str, command: str) -> None:
+    """Raises BadInput for several boards on one line, for a command that takes one."""
+    if scenario.others:
+        what = f"it has {amount(len(scenario.boards), 'board')} on one line, and {command} takes one"
+        raise BadInput(origin, BOARD, what, "`mirotwin run`, `test`, `replay`, `diff`, `serve` take them")
 
 
 def firmware_beside(text: BoardText) -> str:

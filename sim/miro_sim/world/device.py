@@ -82,6 +82,10 @@ class Device:
 
     # Parts of a board
 
+    def source(self, name: str) -> tuple[Any, str]:
+        """Who keeps the changes of a pin or value, None if nobody does, and what it is called there."""
+        return self.changes, name
+
     def check_put(self, path: str, value: PutValue) -> None:
         """Raises ValueError for a part or a key that is not there, and for a value that the part does not take."""
         raise ValueError(f"net{self.network}/robot{self.slot} has no parts to put values of")

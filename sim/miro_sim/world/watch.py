@@ -143,7 +143,8 @@ class Watch:
 
     def _follow(self, condition: Followed, robot_id: tuple[int, int]) -> None:
         """Begins with the level of the pin, or with the value, of now: or of the tick at which the last wait ended."""
-        changes, tick, clock = changes_of(self.world, robot_id), self.world.tick, self.world.clock
+        tick, clock = self.world.tick, self.world.clock
+        changes, source = self.world.device(*robot_id).source(condition.source)
         if changes is None:
             if not isinstance(condition, Edge):  # an edge is an event as it stands
                 assert isinstance(condition, OfPin)
@@ -153,14 +154,14 @@ class Watch:
                 self.followers.append(Followers(condition, robot_id, follower))
             return
         if isinstance(condition, OfPin):
-            place = changes.find(condition.pin)
+            place = changes.find(source)
             on_last_tick = tick - 1 == self.after_tick and condition.pin not in self.after_pins
             level, serial = changes.level_before(place.net, tick - on_last_tick)
             flip = int(place.inverted)
             follower = condition.follower(place.net, flip, clock, tick, level ^ flip)
         else:
-            value, serial = changes.watch_value(condition.source, tick), changes.values.end
-            follower = condition.follower(condition.source, 0, clock, tick, value)
+            value, serial = changes.watch_value(source, tick), changes.values.end
+            follower = condition.follower(source, 0, clock, tick, value)
         self.followers.append(Followers(condition, robot_id, follower, changes))
         self.read.append(serial)
 

@@ -33,13 +33,15 @@ _STOP = CHARACTER_BITS - 1
 
 class BoardAlone(Device):
     """A board on a wire. `parts`: the keys of those that are on it, by name. `reads`: part and key of each value by
-    its path. `changes`: for who watches it. `put_stopped`: whether a put has stopped the run; its next piece tells.
+    its path. `changes`: for who watches it. `line`: of the first of several boards, all of them by their names.
+    `put_stopped`: whether a put has stopped the run; its next piece tells.
     """
 
-    NOT_STATE = ("sample_ticks", "put_stopped", "parts", "reads", "changes")
+    NOT_STATE = ("sample_ticks", "put_stopped", "parts", "reads", "changes", "line")
 
-    def __init__(self, board: EmptyBoard, network: int, image: Image) -> None:
-        Device.__init__(self, board, network, 0, image)
+    def __init__(self, board: EmptyBoard, network: int, image: Image, slot: int = 0) -> None:
+        Device.__init__(self, board, network, slot, image)
+        self.line: dict[str, BoardAlone] = {}
         self.board: EmptyBoard
         self.put_stopped = 0
         self.sample_ticks = board.spec.crystal_hz // 1000
@@ -68,7 +70,20 @@ class BoardAlone(Device):
             lines.append(f"the watchdog reset the processor {times(registers.bites)}, {first}")
         return lines
 
+    def at(self, path: str) -> tuple[BoardAlone, str]:
+        """The board of a path, and what the path is there: of several, a board's name is in front (`panel.lamp.on`)."""
+        name, _, rest = path.partition(".")
+        return (self.line[name], rest) if name in self.line else (self, path)
+
+    def source(self, name: str) -> tuple[Any, str]:
+        board, rest = self.at(name)
+        return board.changes, rest
+
     def check_put(self, path: str, value: PutValue) -> None:
+        board, path = self.at(path)
+        if board is not self:
+            board.check_put(path, value)
+            return
         name, _, _ = checked_put(self.parts, path, value)
         if name in self.parts:
             return
@@ -78,12 +93,19 @@ class BoardAlone(Device):
             raise ValueError(f"{path}: something is wired to it; put a value of that, or choose another pin")
 
     def put(self, path: str, value: PutValue, tick: int) -> None:
+        board, path = self.at(path)
+        if board is not self:
+            board.put(path, value, tick)
+            return
         part, key, taken = checked_put(self.parts, path, value)
         self.put_stopped = self._wired.put(part, key, taken, tick) or self.put_stopped
         if self.changes is not None:
             self.changes.look(tick)
 
     def value(self, path: str) -> float | int | bool | str:
+        board, path = self.at(path)
+        if board is not self:
+            return board.value(path)
         part, key = self.reads.get(path) or checked_read(self.parts, path)
         return self._wired.value(part, key)
 
@@ -99,6 +121,9 @@ class BoardAlone(Device):
 
     def find_pin(self, name: str) -> PinPlace:
         """Where the name of a pin leads. Raises ValueError."""
+        board, name = self.at(name)
+        if board is not self:
+            return board.find_pin(name)
         netlist = self.board.nets.netlist if isinstance(self.board, WiredBoard) else Netlist()
         return find_pin(self.board.spec, netlist, name)
 
@@ -134,7 +159,7 @@ class Wire(Medium):
 
     STATE = {"terminal": Terminal, "bit_ticks": ("q", 0, 1 << 40), "busy_tick": TICK, "transmissions": TICK}
     NOT_HASHED = ("bit_ticks",)
-    NOT_STATE = ("character_ticks", "output", "between")
+    NOT_STATE: tuple[str, ...] = ("character_ticks", "output", "between")
 
     def __init__(
         self,
@@ -160,11 +185,12 @@ class Wire(Medium):
         outbox = Outbox(0, index, CHARACTER_BITS * self.bit_ticks)
         log = HostLog(index, lambda tick: tick, 0)
         alone = BoardAlone(board, index, image)
+        devices = [alone, *self._others(scenario, seed, index, alone)]
         if scenario.terminal is not None:
             alone.pin_moves = moves(scenario.terminal.pins)
         for path, value in sorted(scenario.put.items()):
             alone.put(path, value, 0)
-        Medium.__init__(self, index, host, [alone], outbox, log)
+        Medium.__init__(self, index, host, devices, outbox, log)
         if sending and not self.bit_ticks:
             raise ValueError(f"net{index}: how long a bit of the script is must be given (bit_ticks)")
         if self.terminal is not None and script:
@@ -175,6 +201,10 @@ class Wire(Medium):
             check_bad_stop(sent.bad_stop, len(sent.data))
             self.outbox.inject(sent, 0)
 
+    def _others(self, scenario: BoardScenario, seed: int, index: int, first: BoardAlone) -> list[BoardAlone]:
+        """The other boards on the line."""
+        return []
+
     @property
     def board(self) -> EmptyBoard:
         board: EmptyBoard = self.devices[0].board
@@ -182,8 +212,8 @@ class Wire(Medium):
 
     def begin_period(self, tick: int) -> None:
         Medium.begin_period(self, tick)
-        self.board.begin_period()
         for device in self.devices:
+            device.board.begin_period()
             if device.changes is not None:
                 device.changes.trim()
 
@@ -207,20 +237,28 @@ class Wire(Medium):
 
     def send(self, sent: Transmission) -> None:
         """Start bit, eight data bits, stop bit; a bad one is space for three quarters of a bit."""
-        bit, rxd, tick = self.bit_ticks, self.board.cpu.rxd, sent.tick
+        bit, tick = self.bit_ticks, sent.tick
         self.transmissions += 1
         self.busy_tick = tick + len(sent.data) * CHARACTER_BITS * bit
-        if self.between is not None and not self.between.takes(tick, self.busy_tick - bit, len(sent.data)):
+        if not self._takes(tick, self.busy_tick - bit, len(sent.data)):
             return
         for place, value in enumerate(sent.data):
             for number, level in enumerate((0, *(value >> data_bit & 1 for data_bit in range(8)))):
-                rxd.append(tick + number * bit, level)
+                self._give(tick + number * bit, level)
             stop_tick = tick + _STOP * bit
             if place in sent.bad_stop:
-                rxd.append(stop_tick, 0)
+                self._give(stop_tick, 0)
                 stop_tick += 3 * bit // 4
-            rxd.append(stop_tick, 1)
+            self._give(stop_tick, 1)
             tick += CHARACTER_BITS * bit
+
+    def _takes(self, first_tick: int, end_tick: int, characters: int) -> bool:
+        """Whether a transmission comes to the processor."""
+        return self.between is None or self.between.takes(first_tick, end_tick, characters)
+
+    def _give(self, tick: int, level: int) -> None:
+        """The host's level from `tick` on."""
+        self.board.cpu.rxd.append(tick, level)
 
     def free_tick(self) -> int:
         return self.busy_tick
@@ -251,9 +289,12 @@ class Wire(Medium):
         first_tick = max(0, tick - bits * bit_ticks)
         if self.between is not None and not self.between.gives(first_tick, tick, bit_ticks):
             return
+        self._hear_character(value, tick, first_tick, (bits + 1) * bit_ticks)
+
+    def _hear_character(self, value: int, tick: int, first_tick: int, ticks: int) -> None:
         if self.terminal is not None:
             self.terminal.input.heard(value, tick)
-        self.character_ticks = (bits + 1) * bit_ticks
+        self.character_ticks = ticks
         self.heard.append((value, True, first_tick))
         self.log.note_heard([(value, True, tick)])
         if self.output is not None:

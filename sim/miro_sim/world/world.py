@@ -97,7 +97,10 @@ class World:
         _check_senders(script or (), 1 if isinstance(scenario, BoardScenario) else len(scenario.networks))
         self.bodies: Bodies | None = None
         if isinstance(scenario, BoardScenario):
-            self.lines: list[Medium] = [Wire(scenario, seed, 0, image, script)]
+            wire = Wire
+            if scenario.others:
+                from miro_sim.world.bus import Bus as wire
+            self.lines: list[Medium] = [wire(scenario, seed, 0, image, script)]
         else:
             from miro_sim.world.bodies import Bodies
             from miro_sim.world.network import networks_of
