@@ -59,7 +59,7 @@ HOTTEST = re.compile(
     r"|miro_robot\.(board|wired_board|parts\.(led|lm629|nets|part))"
     r"|miro_robot\.(harness\.(fast_oracle|harness)|lm629\.(bus_timing|chip|encoder|pid))"
     r"|miro_robot\.mcs51\.(chip|cpu|interrupts|line|peripherals|timers|uart)"
-    r"|miro_sim\.pitch\.(camera|rays|scene|sensor)|miro_sim\.plant\.(chassis|differential_drive|drive|rough)"
+    r"|miro_sim\.pitch\.(camera|rays|scene|sensor)|miro_sim\.plant\.(car|chassis|dc_motor|differential_drive|drive|encoder|line_sensors|plane|rough)"
 )
 """What takes half a percent of a run or more. The others are compiled with -Og, which takes a third of the time."""
 QUICKLY = ["-Og", "-finline-small-functions"]  # among them those that count references

@@ -4,6 +4,7 @@ import json
 import sys
 import tomllib
 from contextlib import suppress
+from pathlib import Path
 
 import pytest
 import tomli_w
@@ -333,7 +334,9 @@ def test_a_file_never_makes_us_import_a_path(tmp_path):
 # Whatever a file holds
 
 
-GOOD = (tomllib.loads(FULL), tomllib.loads(CAR))
+EXAMPLES = Path(__file__).parents[2] / "examples" / "boards"
+TEXTS = (FULL, CAR, (EXAMPLES / "car" / "hall.board.toml").read_text("utf-8"))
+GOOD = tuple(tomllib.loads(text) for text in TEXTS)
 WORDS = st.sampled_from(
     ["P1.0", "P0.1", "!P1.1", "CTRL.3", "!CTRL.3", "0", "1", "!0", "other.pin", "lamp.pin", "key.pin", "SDA", "X"]
     + ["", "!", ".", "P4.0", "P1", "key", "CTRL", "led", "button", "at89c51", "internal", "none", "ground", "a.b.c"]
@@ -400,7 +403,7 @@ def test_random_tables_are_a_board_or_one_line(table):
 @given(st.data())
 @examples(200)
 def test_a_text_with_random_edits_is_a_board_or_one_line(data):
-    text = data.draw(st.sampled_from([FULL, CAR]))
+    text = data.draw(st.sampled_from(TEXTS))
     for _ in range(data.draw(st.integers(1, 3))):
         at = data.draw(st.integers(0, len(text)))
         length = data.draw(st.integers(0, 5))

@@ -34,6 +34,7 @@ from miro_sim.plant.plane import MOST_SEGMENTS, Plane
 
 _TURN_RAD = 6.283185307179586
 _DEGREE_RAD = 0.017453292519943295
+_LEAST_WALL_CM = 0.01
 _NO_NEARER_CM = 1e-9
 _MOST_RAD = 1e5  # of a heading that counts whole turns: two hours of a car that spins
 _LEFT, _RIGHT, _REAR_LEFT, _REAR_RIGHT, _BODY = range(5)
@@ -90,8 +91,8 @@ class Car(PartKeys, frozen=True, kw_only=True, tag="car"):
             if count > MOST_SEGMENTS:
                 raise ValueError(f"{key}: {count} pieces, at most {MOST_SEGMENTS} fit")
         for x1, y1, x2, y2 in self.walls:
-            if x1 == x2 and y1 == y2:
-                raise ValueError(f"walls: one from ({x1:g}, {y1:g}) to the same point has no length")
+            if abs(x2 - x1) + abs(y2 - y1) < _LEAST_WALL_CM:
+                raise ValueError(f"walls: one at ({x1:g}, {y1:g}) is shorter than {_LEAST_WALL_CM:g} cm")
 
     @property
     def pieces(self) -> list[tuple[float, float, float, float]]:

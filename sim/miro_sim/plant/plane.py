@@ -1,3 +1,5 @@
+# cython: cdivision=True
+# No divisor below is ever zero: `Car` has no walls shorter than 0.01 cm, and the others are looked at before.
 """The floor that a car drives on: walls, and dark lines on light ground, in cm.
 
 Walls are segments without thickness. Lines are polylines of one width with round ends and corners, and a picture of

@@ -174,6 +174,44 @@ def test_a_car_that_spins_for_hours_still_knows_where_it_looks():
     bench(keys).load(board.save())
 
 
+WIDE = st.one_of(st.floats(0.1, 1.0), st.floats(1.0, 100.0))
+COORDINATE = st.sampled_from([0.0, 1e-3, 1.0, 37.5, 100.0, 1e4]).flatmap(
+    lambda cm: st.sampled_from([cm, -cm])
+)
+WALL = st.tuples(*[COORDINATE] * 4).filter(
+    lambda wall: abs(wall[2] - wall[0]) + abs(wall[3] - wall[1]) >= 0.01
+)
+
+
+@settings(max_examples=30)
+@given(
+    st.builds(
+        Car,
+        wheel_radius_cm=WIDE,
+        track_cm=WIDE,
+        radius_cm=WIDE,
+        mass_kg=WIDE,
+        x_cm=COORDINATE,
+        heading_deg=COORDINATE.filter(lambda degrees: abs(degrees) <= 3600),
+        walls=st.lists(WALL, max_size=6).map(tuple),
+        lines=st.lists(st.lists(st.tuples(COORDINATE, COORDINATE), min_size=2, max_size=3).map(tuple)).map(
+            tuple
+        ),
+        picture=st.lists(st.text("#. ", max_size=5), max_size=5).map(tuple),
+    ),
+    STRETCHES,
+)
+def test_any_car_in_any_hall_drives_and_can_be_saved(car, stretches):
+    board = bench(car)
+    for left, right, ms in stretches:
+        drive(board, left, right, ms * MS)
+        seen = (*pose(board), board.read("eyes.distance_cm"), board.read("line.pattern"))
+        other = bench(car)
+        other.load(board.save())
+        other.tick = board.tick
+        assert seen == (*pose(other), other.read("eyes.distance_cm"), other.read("line.pattern"))
+
+
 def test_without_the_supply_of_its_bridge_it_rolls_out():
     board = bench(Car())
     drive(board, "forward", "forward", 800 * MS)
@@ -192,7 +230,7 @@ def test_a_car_without_motors_says_what_to_wire():
 @pytest.mark.parametrize(
     ("keys", "reason"),
     [
-        ({"walls": ((1.0, 2.0, 1.0, 2.0),)}, "no length"),
+        ({"walls": ((1.0, 2.0, 1.0, 2.0),)}, "shorter than 0.01 cm"),
         ({"walls": ((0.0, 0.0, 1.0, 1.0),) * 1025}, "at most 1024"),
     ],
 )
