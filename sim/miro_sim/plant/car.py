@@ -265,6 +265,7 @@ class CarPart(OnShaft):
 
     def put(self, name: str, value: Any, tick: int) -> None:
         self.speed_changed(self._known(tick) if self.left is not None else tick)
+        self.bumped = 0
         body = self.body
         if name == "x_cm":
             body.x_m = 0.01 * value

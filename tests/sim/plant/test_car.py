@@ -174,6 +174,16 @@ def test_a_car_that_spins_for_hours_still_knows_where_it_looks():
     bench(keys).load(board.save())
 
 
+def test_put_away_from_a_wall_it_drives_on_at_once():
+    board = bench(Car(walls=WALLS))
+    drive(board, "forward", "forward", 5000 * MS)
+    board.put("car.x_cm", -50.0)
+    assert not board.read("car.bumped")
+    drive(board, "forward", "forward", 100 * MS)
+    assert pose(board)[0] > -48
+    assert (board.read("car.bumped"), board.read("car.bumps")) == (False, 1)
+
+
 WIDE = st.one_of(st.floats(0.1, 1.0), st.floats(1.0, 100.0))
 COORDINATE = st.sampled_from([0.0, 1e-3, 1.0, 37.5, 100.0, 1e4]).flatmap(
     lambda cm: st.sampled_from([cm, -cm])
