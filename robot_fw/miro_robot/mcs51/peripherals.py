@@ -439,6 +439,9 @@ class Peripherals:
             self.interrupts.ie = value & 0xBF
         elif address == _IP:
             self.interrupts.ip = value & 0x3F
+        elif address != _SCON and address != _SBUF and not (self.has_timer2 and _T2CON <= address <= _TH2):
+            self.bus.extra_write(address, value)  # it clocks nothing
+            return 0
         else:
             self.settle(cycle)
             self.write_serial(address, value, cycle)
@@ -485,10 +488,8 @@ class Peripherals:
                 self.shift.send(value, cycle)
             else:
                 self.uart.write_sbuf(value)
-        elif self.has_timer2:
-            self._write_timer2(address, value, cycle)
         else:
-            self.bus.extra_write(address, value)
+            self._write_timer2(address, value, cycle)
 
     def _write_timer2(self, address: int, value: int, cycle: int) -> None:
         if address == _T2CON:
@@ -501,8 +502,6 @@ class Peripherals:
         elif address in (_TL2, _TH2):
             shift = 8 * (address - _TL2)
             self.timer2.count = self.timer2.count & 0xFF00 >> shift | value << shift
-        else:
-            self.bus.extra_write(address, value)
 
     def bit_ticks(self) -> int:
         """Length of a bit that the receiver expects, 0 while it is off or its clock does not run regularly yet."""
