@@ -28,7 +28,7 @@ def test_the_case_that_was_found_fails_on_that_firmware_and_on_no_other(mirotwin
 @pytest.mark.parametrize("planted", ALL, ids=NAMES)
 def test_a_campaign_finds_it_within_seconds(mirotwin, engines, planted, tmp_path, monkeypatch):
     monkeypatch.setattr("mirotwin.fuzz.fuzz_command.AFTER_S", 2.0)
-    options = ("--time", "2s", "--minimise", "1s", "--seed", "1", "--out", str(tmp_path / "out"))
+    options = ("--time", "8s", "--minimise", "1s", "--seed", "1", "--out", str(tmp_path / "out"))
     code, out, err = mirotwin("fuzz", *planted.looks_for(), *options)
     assert code == 1, out + err
     assert f"found: {planted.check}-" in err
