@@ -53,6 +53,8 @@ cdef class WiredBoard(EmptyBoard):
     cdef int _put_output(self, int output, int level, long long tick) except -1
     @cython.locals(output=int, foreseen='long long', before='long long')
     cpdef int outputs_changed(self, long long tick) except -1
+    @cython.locals(output=int, level=int)
+    cdef bint _goes_otherwise(self, long long tick) except -1
     @cython.locals(output=int)
     cdef int _foresee(self, long long tick) except -1
     @cython.locals(now='long long', nets=Nets)

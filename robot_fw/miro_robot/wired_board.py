@@ -263,13 +263,13 @@ class WiredBoard(EmptyBoard):
         before = max(tick - 1, self.output_put)
         if (
             tick > self.cpu.cycles * CYCLE_TICKS
-        ):  # where that changes something, looks again when the CPU is there
+        ):  # looks again when the CPU is there, if that changes something
             for output in range(3):
                 foreseen = self.output_ticks[output]
                 if self.outputs >> output & 1 and peripherals.output_after(output, before) != foreseen:
                     self.output_ticks[output] = min(foreseen, tick)
                     self.output_tick = min(self.output_tick, tick)
-        else:
+        elif self._goes_otherwise(before):
             self._before(tick)
             for output in range(3):
                 if self.outputs >> output & 1:
@@ -280,6 +280,22 @@ class WiredBoard(EmptyBoard):
             self.horizon = min(self.horizon, self.output_tick)
             self.cpu.replan()
         return 0
+
+    def _goes_otherwise(self, tick: int) -> bool:
+        """Whether an output is not as it was put, or its next edge later than `tick` not where it was foreseen.
+
+        The serial port also works its clock out again where nothing changes, as after a timer's register is written
+        with the value that it has. Parts must not be brought to that tick then: it may be beyond the end of the run.
+        """
+        peripherals = self.cpu.peripherals
+        for output in range(3):
+            if self.outputs >> output & 1:
+                level = 1 if self.output_levels[_OUTPUT_PORT[output]] & _OUTPUT_MASK[output] else 0
+                if peripherals.output_at(output, tick) != level:
+                    return True
+                if peripherals.output_after(output, tick) != self.output_ticks[output]:
+                    return True
+        return False
 
     def _foresee(self, tick: int) -> None:
         """The next edges later than `tick`."""

@@ -13,7 +13,7 @@ from miro_exact.plugins import PluginError
 from miro_exact.state import Flat
 from miro_robot.parts.nets import Observer
 from tests import children
-from tests.robot.parts.scripted import A, Answer, D, W, board_of, scripted, wired
+from tests.robot.parts.scripted import A, Answer, D, Q, W, board_of, scripted, wired
 from tests.states import restore, snapshot
 
 TXD, RXD, T2 = (3, 1), (3, 0), (1, 0)
@@ -202,3 +202,16 @@ def test_both_engines_do_the_same():
         engine.active() == "python"
         or children.uncompiled(f"from {__name__} import digest; print(digest())").strip() == digest()
     )
+
+
+def test_a_register_written_again_brings_no_part_beyond_the_end_of_a_run():
+    """The timer of the serial port is written in an instruction that goes over the tick at which a run ends."""
+    program = BAUD + "loop:\nMOV TMOD,#20h\nMOV TMOD,#20h\nMOV TMOD,#20h\nSJMP loop"
+    for end_tick in range(2_400, 2_496, 12):
+        boards = []
+        for netlist in (wired({TXD: "n", (1, 5): "q"}, [{A: "n", Q: "q"}]), wired({(1, 5): "q"}, [{Q: "q"}])):
+            keys = scripted("a", events=[(end_tick + later, Q, later // 6 & 1) for later in range(0, 24, 6)])
+            board = board_of(program, netlist, [keys])
+            board.run(end_tick)
+            boards.append((board.cpu.cycles, board.parts[0].next_tick, board.parts[0].events))
+        assert boards[0] == boards[1]
