@@ -202,13 +202,14 @@ class WiredBoard(EmptyBoard):
         return (due if self.drives_rxd or due == self.output_tick else due + 2) // CYCLE_TICKS
 
     def _is_due(self, due: int, due_cycle: int) -> bool:
-        """Whether an event is to be handled before the next instruction; a MOVX moves the pins of its bus before it."""
-        now = self.cpu.cycles
-        if due_cycle > now:
+        """Whether an event is to be handled before the next instruction; a MOVX moves the pins of its bus before it.
+
+        All events of the cycle in which a MOVX begins wait for it: pins are sampled once in that cycle.
+        """
+        if due_cycle > self.cpu.cycles:
             return False
-        return not (
-            self.on_bus and due >= now * CYCLE_TICKS + _ADDRESS and self.cpu.code_at(self.cpu.pc) in _MOVX
-        )
+        waits = self.on_bus and due_cycle == self.cpu.cycles and self.cpu.code_at(self.cpu.pc) in _MOVX
+        return not (waits and self.cpu.executes_next())
 
     def _is_before_write(self, due_cycle: int) -> bool:
         """Whether the pins of `due_cycle` are sampled within the next instruction, which may write a register after.

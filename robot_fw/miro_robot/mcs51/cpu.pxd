@@ -18,6 +18,7 @@ cdef class Cpu(Chip):
     cdef int boundary(self) except -1
     @cython.locals(blocked=bint)
     cdef inline int _attend(self, long long now) except -1
+    cpdef bint executes_next(self) except -1
     cdef int _note_end(self, long long now) except -1
     cdef int _look_for_sleep(self, long long now) except -1
     cdef int _watch_main_loop(self, long long now) except -1

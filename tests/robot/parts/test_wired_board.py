@@ -4,7 +4,7 @@ import hashlib
 import random
 
 import pytest
-from hypothesis import given
+from hypothesis import example, given
 from hypothesis import strategies as st
 
 from miro_exact import engine
@@ -86,6 +86,7 @@ MOV T2CON,#0Dh
 SJMP loop
 """
 SLEEP = "loop:\nORL PCON,#1\nMOV A,P1\nMOVX @DPTR,A\nINC DPTR\nSJMP loop\n"
+P1_0, P3_2 = (P1, 0), (P3, 2)
 PINS = [(P1, 0), (P1, 1), (P1, 5), (P2, 3), (P3, 2), (P3, 3), (P3, 4), (P3, 7)]
 END = 9_000
 
@@ -112,8 +113,13 @@ def edge_lists(draw):
     return edges
 
 
+TWICE_IN_A_CYCLE = [(1, *P1_0, 0), (70, *P3_2, 0), (82, *P3_2, 1), (454, *P1_0, 1), (464, *P1_0, 0)]
+"""Pins are sampled once in the cycle from 453 to 465, in which a MOVX begins that moves the pins of its bus at 464."""
+
+
 @pytest.mark.parametrize("program", [POLL, REGISTERS, SLEEP], ids=["polled", "registers", "asleep"])
 @given(edge_lists())
+@example(TWICE_IN_A_CYCLE)
 def test_an_edge_from_a_part_is_one_from_a_file_of_pins(program, edges):
     bare = Alone(image_of(INTERRUPTS + program), pins=tuple(PinEvent(*edge) for edge in edges))
     bare.board.stop_at_end = False
