@@ -261,7 +261,10 @@ class BoardTarget(Target):
             elif isinstance(item, Reset) and item.level:
                 data.append(RESET)
             elif isinstance(item, Put) and self.wired is not None:
-                which = [path for path, _ in self.wired.choices].index(item.path)
+                paths = [path for path, _ in self.wired.choices]
+                if item.path not in paths:  # of another board, or of a type that no bits choose
+                    continue
+                which = paths.index(item.path)
                 op, number = (PUT, which) if which < self.wired.values else (PIN, which - self.wired.values)
                 data += op + bytes([number]) + self.wired.bits_of(which, item.value).to_bytes(2, "little")
         return [bytes(data)] if data else []

@@ -160,13 +160,13 @@ class WiredMachine:
 
     def bits_of(self, which: int, value: PutValue) -> int:
         """The 16 bits that put `value`, or the next to it."""
-        value_of = self.choices[which][1]
-        for bits in range(0x10000):
-            if value_of(bits) == value:
-                return bits
-        if isinstance(value, str):
+        values = [self.choices[which][1](bits) for bits in range(0x10000)]
+        if value in values:
+            return values.index(value)
+        numbers = [bits for bits, one in enumerate(values) if not isinstance(one, str)]
+        if isinstance(value, str) or not numbers:
             return 0
-        return min(range(0x10000), key=lambda bits: abs(float(value_of(bits)) - value))
+        return min(numbers, key=lambda bits: abs(float(values[bits]) - value))
 
     def fault(self) -> FirmwareFault | None:
         """The first one of the last run."""

@@ -1,7 +1,9 @@
 """The fuzzer's target that is a board with parts: what it does is what a World does, to the tick."""
 
 from pathlib import Path
+from typing import Annotated, Literal
 
+import msgspec
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
@@ -12,7 +14,7 @@ from miro_sim.scenario.board_scenario import load_any
 from mirotwin.fuzz.board_target import BoardTarget, wired_target
 from mirotwin.fuzz.oracle import BoardOracle
 from mirotwin.fuzz.spec import TargetSpec
-from mirotwin.fuzz.wired import WiredMachine
+from mirotwin.fuzz.wired import WiredMachine, choice_of
 from mirotwin.shell.firmware_image import image_for
 from mirotwin.verify.steps.reading import steps_in
 from tests.mirotwin.board_files import BOARD, ECHO, board_folder
@@ -93,6 +95,19 @@ def test_what_can_be_put_follows_from_the_types_of_the_parts(car):
     assert not {"P1.0", "P1.1", "P2.5", "P3.0", "P3.1"} & {*pins}  # parts, and the serial port
     for value_of in choices.values():
         assert len({value_of(bits) for bits in range(0, 0x10000, 17)}) > 1
+
+
+def test_a_number_between_two_that_bits_choose_becomes_the_nearer_also_beside_words(car):
+    machine = car.machine
+    info = msgspec.inspect.type_info(Annotated[float, msgspec.Meta(ge=2.0, le=400.0)] | Literal["none"])
+    machine.choices.append(("own.distance_cm", choice_of(info)))
+    try:
+        which = len(machine.choices) - 1
+        value_of = machine.choices[which][1]
+        assert value_of(machine.bits_of(which, 60.0001)) == pytest.approx(60.0001, abs=0.02)
+        assert value_of(machine.bits_of(which, "none")) == "none"
+    finally:
+        machine.choices.pop()
 
 
 def test_a_run_leaves_nothing_to_the_next(car):

@@ -66,6 +66,17 @@ def test_firmware_without_a_serial_port_is_fuzzed_by_what_its_parts_say(mirotwin
     assert code == 1, err
 
 
+def test_what_a_stream_of_another_board_puts_is_left_out(mirotwin, engines, tmp_path):
+    board_folder(tmp_path)
+    (tmp_path / "corpus").mkdir()
+    (tmp_path / "corpus/other.stream").write_text(
+        "# mirotwin stream 3\n1000 * eyes.distance_cm = 60\n400000 > 68 69\n"
+    )
+    options = ("--firmware", str(tmp_path / "lamp.hex"), "--corpus", str(tmp_path / "corpus"))
+    code, _, err = campaign(mirotwin, tmp_path, tmp_path / "lamp.board.toml", *options)
+    assert code == 0, err
+
+
 CONTENDS = """
 crystal_hz = 11_059_200
 [parts.key]
