@@ -13,6 +13,8 @@ import click
 from miro_exact.bad_input import BadInput, amount
 from miro_exact.inputs import check_memory
 from miro_protocol.transmission import DOWN, Transmission
+from miro_sim.scenario.board import BoardScenario
+from miro_sim.scenario.board_scenario import check_single
 from mirotwin.recording.capture import render
 from mirotwin.recording.capture.detect import NAMES, TIMED, detect
 from mirotwin.recording.capture.input import STDIN, Input
@@ -182,6 +184,8 @@ def export_board(options: ExportOptions, to: str) -> int:
     with ProgressBar("running it again", job.end_tick, options.quiet or to != "csv") as bar:
         pieces: Iterable[bytes]
         if to == "csv":
+            if isinstance(job.spec.scenario, BoardScenario):
+                check_single(job.spec.scenario, options.file, "CSV")
             pieces = board_csv(job, bar.to)
         else:
             pieces = board_capture(job, complain) if to == "pcapng" else [board_stream(job).encode()]

@@ -26,7 +26,8 @@ class Result(msgspec.Struct, frozen=True, kw_only=True):
 
     `expectations`: of all checks. `done` of `steps`; `unseen`: steps and expectations that no port shows. `tick`: where
     the run ended; `clock`: ticks per second. `left`: the folder with its case; `left_out`: what settings left out,
-    a line each. `again`: the command that gives the verdict again; `error`: why there was no run.
+    a line each. `again`: the command that gives the verdict again; `error`: why there was no run. `has_page`: whether
+    `mirotwin report` makes a page of it.
     """
 
     path: str = ""
@@ -46,6 +47,7 @@ class Result(msgspec.Struct, frozen=True, kw_only=True):
     left_out: Sequence[str] = ()
     again: str = ""
     error: Exception | None = None
+    has_page: bool = True
 
     @property
     def code(self) -> int:

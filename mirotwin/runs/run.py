@@ -195,6 +195,7 @@ class Run:
             seed=self.spec.seed,
             digest=world.digest,
             firmware_sha256=world.image.sha256 or "",
+            has_page=not (isinstance(world.scenario, BoardScenario) and world.scenario.others),
         )
 
     # As files

@@ -105,7 +105,8 @@ def _with_artifacts(run: Run, case: str | None, result: Result, folder: Path, te
     try:
         run.keep_saved(folder)
         if failed:
-            lines = (result.path, *result.lines, *result.notes, report_line(str(folder)), result.again)
+            page = [report_line(str(folder))] if result.has_page else []
+            lines = (result.path, *result.lines, *result.notes, *page, result.again)
             case = case or (run.case() if run.failures else None)
             files = stream_files(case, run.stream(), run.spec.image)
             leave(folder, "\n".join((*lines, "")), {SCENARIO: encodable(text.text).encode(), **files})

@@ -127,7 +127,7 @@ def tell(
             clear(folder, SUMMARY, RECORDING)
             files, lines = rig.left(None if caught is None else caught.value, where)
             more = story(rig, result, failed_at, [result.again, *lines])
-            more += f"\n{report_line(where)}" * bool(files)
+            more += f"\n{report_line(where)}" * bool(files and result.has_page)
             leave(folder, f"{more}\n", {SUMMARY: json.dumps(summary, indent=2).encode() + b"\n", **files})
             text = more
         except (OSError, BadInput) as error:  # the failure is shown, whatever becomes of its files

@@ -82,7 +82,7 @@ def test(options: TestOptions) -> int:
         tell_notes(note for note in result.left_out if note not in left_out)
         left_out |= dict.fromkeys(result.left_out)
         _show(result, options.quiet)
-        if options.pages and result.left:
+        if options.pages and result.left and result.has_page:
             try:
                 leave_page(Path(result.left))
             except (OSError, BadInput) as error:
@@ -121,7 +121,8 @@ def _show(result: Result, quiet: bool) -> None:
             own = not case.with_name(FIRMWARE).exists()
             for line in case_lines(result.left, own):
                 show_line(f"    {line}")
-        show_line(f"    {report_line(result.left)}")
+        if result.has_page:
+            show_line(f"    {report_line(result.left)}")
     if not passed and result.verdict != "error":
         show_line(f"    {result.again}")
 

@@ -109,7 +109,7 @@ def test_a_scenario_of_the_example_is_whole():
     assert set(read["board"]) == {"meter", "panel"}
 
 
-@pytest.mark.parametrize("command", ["report", "fuzz"])
+@pytest.mark.parametrize("command", ["report", "fuzz", "CSV"])
 def test_a_command_for_one_board_says_so(folder, command):
     scenario = text_of(folder, TWO).scenario
     with pytest.raises(BadInput, match=f"2 boards on one line, and {command} takes one"):

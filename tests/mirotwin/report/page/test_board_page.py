@@ -2,6 +2,7 @@
 
 import json
 import re
+from itertools import pairwise
 from pathlib import Path
 
 import numpy as np
@@ -103,6 +104,38 @@ def test_the_serial_text_stands_with_its_hex(rover):
     assert "to it p 70" in said
 
 
+LINES = """
+MOV RCAP2H,#0FFh
+MOV RCAP2L,#0DCh
+MOV T2CON,#34h
+MOV SCON,#40h
+loop:
+MOV A,#61h
+ACALL put
+MOV A,#0Dh
+ACALL put
+MOV A,#0Ah
+ACALL put
+SJMP loop
+put:
+MOV SBUF,A
+JNB TI,$
+CLR TI
+RET
+"""
+
+
+def test_each_line_of_serial_text_stands_at_its_own_time(tmp_path, mirotwin):
+    scenario = board_folder(tmp_path, SCENARIO, program=LINES)
+    mirotwin.succeeds("run", scenario, "--out", tmp_path / "run", "-q", "--for", "0.1s")
+    mirotwin.succeeds("report", tmp_path / "run", "-o", tmp_path / "page.html", "-q")
+    ticks = [int(tick) for tick in re.findall(r'<tr data-tick="(\d+)"', (tmp_path / "page.html").read_text())]
+    assert len(ticks) > 25
+    apart = [late - early for early, late in pairwise(ticks)]
+    character = 10 * 1152
+    assert all(3 * character <= one < 4 * character for one in apart), apart
+
+
 def test_a_display_is_any_part_with_a_text_to_read(rover):
     text = rover.read_text()
     assert re.search(r'<pre class="glass">--- cm +\nstop +</pre>', text)
@@ -188,6 +221,23 @@ def test_a_failed_test_of_a_board_leaves_its_page(tmp_path, mirotwin):
     page = Markup(folder / "report.html")
     assert "failed test of a board" in page.text
     assert "lamp.flashes above 99 within" in page.text or "lamp.flashes = 4" in page.text
+
+
+def test_a_failed_test_of_two_boards_names_no_page(tmp_path, mirotwin):
+    monitor = ROVER.parents[1] / "monitor"
+    for file in monitor.iterdir():
+        (tmp_path / file.name).write_bytes(file.read_bytes())
+    scenario = tmp_path / "overload.scenario.toml"
+    scenario.write_text(scenario.read_text().replace("P 644W off", "never"))
+    code, said, _ = mirotwin("test", scenario, "--artifacts", tmp_path / "left", "--pages")
+    assert (code, "mirotwin replay" in said, "page" in said) == (1, True, False)
+    case = next((tmp_path / "left").rglob("case.stream"))
+    assert "page" not in case.with_name("report.txt").read_text()
+    firmware = tmp_path / "meter.ihx"
+    error = mirotwin.refuses(
+        "export", case, "--firmware", firmware, "--as", "csv", "--out", tmp_path / "a.csv"
+    )
+    assert "2 boards on one line, and CSV takes one" in error
 
 
 def test_a_case_of_a_bare_processor_has_a_page_without_pins(tmp_path, mirotwin):
