@@ -27,7 +27,7 @@ MOST_ROWS = 400
 """Largest number of lines of serial text that are listed."""
 LONGEST_ROW = 80
 TOGETHER_MS, MARK_MS, STEP_MS = 20, 1, 1
-"""Characters with a longer pause between them are two lines; so wide is what takes no time; a step of the slider."""
+"""Characters further apart are two lines; the width of a mark without a duration; a step of the slider."""
 MOST_STEPS = 20_000
 
 
@@ -74,10 +74,8 @@ def board_page(material: Material, first_tick: int, end_tick: int) -> bytes:
         [mark for one in moved if _is_state(one) for mark in _state_marks(one, end_tick)],
         [tick for tick in dict.fromkeys(ticks) if first_tick <= tick < end_tick],
     )
-    rows, step = (
-        _rows(wire, scenario.clock),
-        max(scenario.clock * STEP_MS // 1000, window.span // MOST_STEPS),
-    )
+    rows = _rows(wire, scenario.clock, _character_ticks(scenario))
+    step = max(scenario.clock * STEP_MS // 1000, window.span // MOST_STEPS)
     data = {
         "ticks_per_s": scenario.clock,
         "first": first_tick,
@@ -132,29 +130,31 @@ def _together(numbers: Sequence[Changed], scenario: BoardScenario) -> list[list[
     return [some[at : at + most] for some in groups.values() for at in range(0, len(some), most)]
 
 
-def _rows(wire: Sequence[Transmission], clock: int) -> list[SerialRow]:
+def _rows(wire: Sequence[Transmission], clock: int, character_ticks: int) -> list[SerialRow]:
     """What was sent, each way in lines: to a line end, a pause, or what went the other way."""
     rows: list[SerialRow] = []
-    last_tick = 0
+    end_tick = 0
     for sent in sorted(wire, key=lambda one: one.tick):
-        near = sent.tick - last_tick < clock * TOGETHER_MS // 1000
-        last_tick = sent.tick
-        if near and rows[-1:] and rows[-1].direction == sent.direction:
-            rows[-1] = rows[-1]._replace(data=rows[-1].data + sent.data)
-        else:
-            rows.append(SerialRow(sent.tick, sent.direction, sent.data))
-    return [
-        row._replace(data=line[at : at + LONGEST_ROW])
-        for row in rows
-        for line in row.data.splitlines(keepends=True)
-        for at in range(0, len(line), LONGEST_ROW)
-    ]
+        for number in range(len(sent.data)):
+            tick, character = sent.tick + number * character_ticks, sent.data[number : number + 1]
+            near = tick - end_tick < clock * TOGETHER_MS // 1000
+            end_tick = tick
+            if near and rows and rows[-1].direction == sent.direction and _goes_on(rows[-1].data, character):
+                rows[-1] = rows[-1]._replace(data=rows[-1].data + character)
+            else:
+                rows.append(SerialRow(tick, sent.direction, character))
+    return rows
+
+
+def _goes_on(line: bytes, character: bytes) -> bool:
+    """Whether a character belongs to the line before it."""
+    ended = line.endswith(b"\n") or (line.endswith(b"\r") and character != b"\n")
+    return not ended and len(line) < LONGEST_ROW
 
 
 def _marks(material: Material, wire: Sequence[Transmission], scenario: BoardScenario) -> list[LinkMark]:
     """Steps, what was done, characters and faults, each on its lane."""
     short = scenario.clock * MARK_MS // 1000
-    bit = scenario.host_bit_ticks or scenario.clock // 9600
     marks = [
         LinkMark("steps", "damaged" if failed else ("fresh", "repeated")[number % 2], begin, end, text)
         for number, (begin, end, text, failed) in enumerate(material.again.steps)
@@ -164,11 +164,15 @@ def _marks(material: Material, wire: Sequence[Transmission], scenario: BoardScen
         marks.append(LinkMark(lane, "action", action.tick, action.tick + short, text))
     for sent in wire:
         lane, kind = ("sent to it", "sent") if sent.direction == DOWN else ("it sends", "answer")
-        end, text = sent.tick + CHARACTER_BITS * bit * len(sent.data), SerialRow(0, "", sent.data).text
+        end, text = sent.tick + _character_ticks(scenario) * len(sent.data), SerialRow(0, "", sent.data).text
         marks.append(LinkMark(lane, kind, sent.tick, end, text))
     for _, _, fault in material.again.faults:
         marks.append(LinkMark("faults", "damaged", fault.tick, fault.tick + short, f"{fault}"))
     return marks
+
+
+def _character_ticks(scenario: BoardScenario) -> int:
+    return CHARACTER_BITS * (scenario.host_bit_ticks or scenario.clock // 9600)
 
 
 def _begin(mark: LinkMark) -> int:
