@@ -244,9 +244,9 @@ class EmptyBoard(ProcessorBoard):
         elif self.held and not level and self.powered:
             self.cpu.reset()
         self.forced = 0
-        self.held = level
-        if self.registers is not None:
+        if self.registers is not None and (level or self.held):
             self.registers.clear()
+        self.held = level
         self._begin_again()
 
     def set_power(self, on: int) -> None:

@@ -233,6 +233,17 @@ def test_what_the_chip_lacks_is_counted_by_address_and_not_what_looks_at_it():
     assert made.lacking_registers() == {0xC8: 1}
 
 
+def test_a_reset_pin_that_goes_low_again_without_having_been_high_changes_nothing():
+    made, same = (board(STC, [*command(3, 0x2000), ("wait", 30)]) for _ in range(2))
+    for one in (made, same):
+        one.run(12 * 40)
+    assert made.registers.pause
+    made.set_reset(0)
+    for one in (made, same):
+        one.run(12 * 60_000)
+    assert made.cpu.instructions == same.cpu.instructions > 30
+
+
 def test_what_is_executed_again_is_counted_once():
     made = board("at89c52", [("wait", 20), ("write", 0xE1, 1), ("wait", 20)])
     made.run(12 * 10)
