@@ -302,10 +302,11 @@ class Ds18b20Part(Part):
         if name == "temperature_c":
             self.temperature_c = value
             return
+        was_short = self.broken == _SHORT
         self.broken = _BROKEN.index(value)
         if self.broken == _MISSING:
             self._lose()
-        if self.broken != _CRC:
+        if self.broken != _CRC or was_short:
             self.phase, self.next_tick = _IDLE, _NEVER
             self.drive(0, LOW if self.broken == _SHORT else RELEASED)
 

@@ -243,6 +243,8 @@ def test_one_that_is_broken_is_missed_or_sends_a_wrong_sum_or_shorts_the_wire():
     assert wire.level("dq") == 0
     assert wire.reset()  # it looks like a presence pulse: that it never ends is what a program should see
     assert wire.level("dq") == 0
+    wire.put("chip.broken", "crc")
+    assert crc8((values := scratchpad(wire))[:8]) != values[8]
     wire.put("chip.broken", "none")
     assert measured(wire) == 85.0
     assert wire.value("broken") == "none"
