@@ -114,9 +114,9 @@ def _is_car(keys: Any) -> bool:
 
 
 def _is_state(one: Changed) -> bool:
-    """Whether it is a text, or on and off."""
-    return all(
-        isinstance(value, str) or (type(value) is not float and value in (0, 1)) for value in one.values
+    """Whether it is drawn as bars: it is a text, if only at times, or on and off."""
+    return any(isinstance(value, str) for value in one.values) or all(
+        type(value) is not float and value in (0, 1) for value in one.values
     )
 
 
@@ -190,9 +190,10 @@ def _state_marks(one: Changed, end_tick: int) -> list[LinkMark]:
 
 
 def _short(value: Any) -> str:
-    """A text of several rows in one."""
-    rows = (row.strip() for row in value.split("\n")) if isinstance(value, str) else ("on",)
-    return " / ".join(row for row in rows if row)
+    """A text of several rows in one; a number among texts."""
+    if not isinstance(value, str):
+        return "on" if value == 1 else f"{value:g}"
+    return " / ".join(row.strip() for row in value.split("\n") if row.strip())
 
 
 def _plain(value: Any) -> Any:

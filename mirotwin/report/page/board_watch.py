@@ -134,7 +134,11 @@ def _thinned(values: list[Any], first: int, end: int) -> list[int]:
     if end - first <= MOST_VALUES:
         return list(range(first, end))
     size, kept = -(-4 * (end - first) // MOST_VALUES), set[int]()
+
+    def order(at: int) -> tuple[bool, Any]:  # parts may have a number or a word
+        return isinstance(values[at], str), values[at]
+
     for begin in range(first, end, size):
         part = range(begin, min(begin + size, end))
-        kept |= {part[0], min(part, key=values.__getitem__), max(part, key=values.__getitem__), part[-1]}
+        kept |= {part[0], min(part, key=order), max(part, key=order), part[-1]}
     return sorted(kept)

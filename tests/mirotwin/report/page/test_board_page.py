@@ -13,7 +13,7 @@ from hypothesis import strategies as st
 from mirotwin.report.page import board_watch
 from mirotwin.report.page.board_watch import Wave
 from tests.mirotwin import program
-from tests.mirotwin.board_files import SCENARIO, board_folder
+from tests.mirotwin.board_files import BOARD, SCENARIO, board_folder
 from tests.mirotwin.report.page.test_run_page import Markup
 
 ROVER = Path(__file__).parents[4] / "examples/boards/rover/pause.scenario.toml"
@@ -134,6 +134,34 @@ def test_each_line_of_serial_text_stands_at_its_own_time(tmp_path, mirotwin):
     apart = [late - early for early, late in pairwise(ticks)]
     character = 10 * 1152
     assert all(3 * character <= one < 4 * character for one in apart), apart
+
+
+OWN_PART = """
+from miro_robot.parts.keys import IN, PartKeys, Pin
+from miro_robot.parts.part import Part
+
+class Gauge(PartKeys, frozen=True, kw_only=True, tag="gauge"):
+    PINS = (Pin("pin", IN),)
+    READS = {"level": "a number, or a word for what is none"}
+
+    def make(self, place):
+        return GaugePart(self, place)
+
+class GaugePart(Part):
+    def read(self, name, tick):
+        return "empty" if self.levels & 1 else 0.5
+"""
+
+
+def test_a_value_that_is_a_word_at_times_is_drawn_as_bars(tmp_path, mirotwin, monkeypatch):
+    monkeypatch.setattr(board_watch, "MOST_VALUES", 8)
+    (tmp_path / "gauge.py").write_text(OWN_PART)
+    gauge = '[parts.gauge]\npart = "gauge"\npins = { pin = "P2.0" }\n'
+    scenario = board_folder(tmp_path, SCENARIO, BOARD + gauge, PULSES)
+    part = f"--part={tmp_path / 'gauge.py'}:Gauge"
+    mirotwin.succeeds("run", scenario, part, "--out", tmp_path / "run", "-q", "--for", "0.1s")
+    mirotwin.succeeds("report", tmp_path / "run", part, "-o", tmp_path / "page.html", "-q")
+    assert {"empty", 0.5} == {*Markup(tmp_path / "page.html").data["values"]["gauge.level"][1]}
 
 
 def test_a_display_is_any_part_with_a_text_to_read(rover):
