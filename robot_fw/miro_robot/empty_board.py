@@ -280,7 +280,7 @@ class EmptyBoard(ProcessorBoard):
         self._begin_again()
 
     def _registers_due(self) -> None:
-        """What the chip's own registers want between two instructions: reset by the watchdog, and its end."""
+        """Between two instructions: begins or ends a reset that the chip's own registers request."""
         registers = self.registers
         if registers is not None and self.powered and not self.held:
             wanted = registers.due()

@@ -69,13 +69,8 @@ class WiredBoard(EmptyBoard):
     NOT_HASHED: tuple[str, ...] = ("outside",)
     NOT_STATE = (
         *("nets", "horizon", "part_index", "pushed", "starved", "on_bus", "drives_rxd"),
-        *(
-            "outputs",
-            "output_levels",
-            "output_ticks",
-            "output_tick",
-            "output_put",
-        ),  # follow from the peripherals
+        # follow from the peripherals
+        *("outputs", "output_levels", "output_ticks", "output_tick", "output_put"),
         *("latch_count", "latch_address", "latch_mask", "buffer_count", "buffer_address", "buffer_mask"),
     )
 
@@ -262,9 +257,7 @@ class WiredBoard(EmptyBoard):
         """All edges below `tick` have been put, and some beyond it where the change comes from pins sampled then."""
         peripherals = self.cpu.peripherals
         before = max(tick - 1, self.output_put)
-        if (
-            tick > self.cpu.cycles * CYCLE_TICKS
-        ):  # looks again when the CPU is there, if that changes something
+        if tick > self.cpu.cycles * CYCLE_TICKS:  # looks again when the CPU is there, if something changes
             for output in range(3):
                 foreseen = self.output_ticks[output]
                 if self.outputs >> output & 1 and peripherals.output_after(output, before) != foreseen:

@@ -34,14 +34,8 @@ _RECORD_LX51 = re.compile(r"^\s+(?:([0-9A-F]{8})H(?:\.([0-7]))?|---)\s+([A-Z]+)\
 _LX51_CLASSES = {"00": "DATA", "01": "CODE", "02": "XDATA"}  # the first byte of an address
 _OPENS, _CLOSES = ("PROC", "DO", "BLOCK"), ("ENDPROC", "ENDDO", "BLOCKEND")
 _SPACES = {
-    "C": "code",
-    "I": "iram",
-    "X": "xram",
-    "IDATA": "iram",
-    "XDATA": "xram",
-    "CODE": "code",
-    "CONST": "code",
-}
+    "C": "code", "I": "iram", "X": "xram", "IDATA": "iram", "XDATA": "xram", "CODE": "code", "CONST": "code"
+}  # fmt: skip
 _NO_NAME = "_ICE_DUMMY_"  # of the compiler, at 0000h of each module
 _LEAST_SFR, _BIT_BYTES = 0x80, 0x20
 _LJMP = 0x02

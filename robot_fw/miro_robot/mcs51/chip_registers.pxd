@@ -45,8 +45,6 @@ cdef class Stc89c52Registers(ChipRegisters):
     cdef int xram_bytes
     cdef unsigned char flash[5120]
 
-    cdef int read_isp(self, int address) except -1
     cdef int write_watchdog(self, int value) except -1
     cdef int write_isp(self, int address, int value) except -1
-    cdef int plan_reset(self) except -1
     cdef command(self, int at)

@@ -36,7 +36,7 @@ _WAITS = (43, 240, 43_769, 22, 120, 21_885, 11, 60, 10_942, 6, 30, 5_741)  # cyc
 
 
 class ChipRegisters:
-    """What an AT89S52 and an STC89C52 have alike. `due_cycle`: by when the board has to ask (`due`)."""
+    """What an AT89S52 and an STC89C52 have in common. `due_cycle`: the cycle by which the board has to call `due`."""
 
     STATE: dict[str, object] = {
         "auxr": ("i", 0, 0xFF),
@@ -73,7 +73,7 @@ class ChipRegisters:
         self.due_cycle = NEVER_TICK
 
     def begin(self) -> None:
-        """The supply comes."""
+        """As after power-on."""
         self.clear()
 
     def read(self, address: int) -> int:
@@ -144,7 +144,7 @@ class ChipRegisters:
         return done
 
     def note_bite(self) -> None:
-        """Counts it once, also where a wait goes back and it comes again."""
+        """Counts a reset by the watchdog once, also where a wait goes back and the run repeats it."""
         cycles = self.cpu.cycles
         if cycles > self.last_bite:
             self.first_bite = self.first_bite if self.bites else 12 * cycles
@@ -256,19 +256,10 @@ class Stc89c52Registers(ChipRegisters):
         if address == _P4:
             return self.p4
         if _ISP_DATA <= address <= _ISP_CONTR:
-            return self.read_isp(address)
+            high, low = self.isp_address >> 8, self.isp_address & 0xFF
+            isp = (self.isp_data, high, low, self.isp_cmd, 0xFF, self.isp_contr)  # ISP_TRIG is write only
+            return isp[address - _ISP_DATA]
         return self.iph if address == _IPH else ChipRegisters.read(self, address)
-
-    def read_isp(self, address: int) -> int:
-        if address == _ISP_DATA:
-            return self.isp_data
-        if address == _ISP_ADDRH:
-            return self.isp_address >> 8
-        if address == _ISP_ADDRL:
-            return self.isp_address & 0xFF
-        if address == _ISP_CMD:
-            return self.isp_cmd
-        return self.isp_contr if address == _ISP_CONTR else 0xFF  # ISP_TRIG
 
     def write(self, address: int, value: int) -> int:
         if address == _WDT_CONTR:
@@ -325,17 +316,15 @@ class Stc89c52Registers(ChipRegisters):
             self.isp_cmd = value & 0x07
         elif address == _ISP_CONTR:
             self.isp_contr = value & 0xE7
-            if value & _SWRST:  # the monitor that SWBS would start is not there: it ends in the program, too
-                self.plan_reset()
+            if (
+                value & _SWRST
+            ):  # after this instruction; SWBS changes nothing, for there is no monitor to start
+                self.due_cycle = 0
+                self.cpu.request_stop()
         else:
             if value == 0xB9 and self.key and self.isp_contr & _ISPEN:
                 self.command(self.isp_address - _FLASH_AT)
             self.key = 1 if value == 0x46 else 0
-
-    def plan_reset(self) -> None:
-        """SWRST: held in reset from the end of this instruction on."""
-        self.due_cycle = 0
-        self.cpu.request_stop()
 
     def due(self) -> int:
         return 1 if self.isp_contr & _SWRST else ChipRegisters.due(self)

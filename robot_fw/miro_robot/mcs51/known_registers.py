@@ -54,7 +54,7 @@ KNOWN = (
 
 
 def lacking_lines(chip: str, counts: Mapping[int, int]) -> Iterator[str]:
-    """What to say of registers that a chip has not, and that a program has accessed so often, by address."""
+    """A line for each group of registers that the chip lacks. `counts`: accesses by address."""
     left = {address: count for address, count in counts.items() if count}
     for known in KNOWN:
         taken = {
@@ -65,7 +65,7 @@ def lacking_lines(chip: str, counts: Mapping[int, int]) -> Iterator[str]:
         if known.chips:
             remedy = f'chip = "{known.chips[0]}" has {"it" if known.first == known.last else "them"}'
         else:
-            remedy = f"{known.families} have, and no chip here"
+            remedy = f"no chip here has it, {known.families} have"
         yield f"the {chip} lacks {_addresses(taken)} ({known.name}), accessed {times(sum(taken.values()))}; {remedy}"
     if left:
         yield f"the {chip} lacks {_addresses(left)}, accessed {times(sum(left.values()))}; they read FFh"

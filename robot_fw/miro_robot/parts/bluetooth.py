@@ -11,9 +11,7 @@ from miro_robot.parts.keys import HIGH, LOW, STRONG, PartKeys, Pin, Place
 from miro_robot.parts.part import Part
 from miro_robot.parts.wire_part import WirePart
 
-_TOLERANCE = (
-    25  # a receiver's centre of the tenth bit must not be off by half a bit: 1 in 25, both ends together
-)
+_TOLERANCE = 25  # the centre of the tenth bit is less than half a bit off: 1 in 25, both ends together
 
 
 class Bluetooth(PartKeys, frozen=True, kw_only=True, tag="bluetooth"):

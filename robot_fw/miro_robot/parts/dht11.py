@@ -24,13 +24,8 @@ from miro_robot.parts.part import Part
 
 _NEVER = 1 << 62
 _BEGIN_US = 1e6  # after power-on
-_WAIT_US, _ANSWER_US, _LOW_US, _ZERO_US, _ONE_US = (
-    30.0,
-    80.0,
-    50.0,
-    26.0,
-    70.0,
-)  # T_go, T_rel, T_LOW, T_H0, T_H1
+# T_go, T_rel, T_LOW, T_H0, T_H1
+_WAIT_US, _ANSWER_US, _LOW_US, _ZERO_US, _ONE_US = 30.0, 80.0, 50.0, 26.0, 70.0
 _LAST_STEP = 84  # odd ones pull the wire low; 1 and 2 are the answer, 3 to 82 the bits, 83 and 84 the end
 _BROKEN = ("none", "missing", "sum")
 _MISSING, _SUM = 1, 2
