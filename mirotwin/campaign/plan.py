@@ -240,7 +240,7 @@ def _scenarios(plan: Plan) -> dict[str, AnyText]:
         with BadInput.at(plan.path, place):
             if is_board(name):
                 remedy = f'write a NAME.scenario.toml with board = "{Path(name).name}" and duration_s'
-                raise BadInput("", "", f"{name} is a board, which no run ends by itself", remedy)
+                raise BadInput("", "", f"{name} is a board, which has no duration", remedy)
         try:
             own = ("expect={}",) if name in builtin_names() else ()  # a campaign varies what it presupposes
             text = load_any(name, own)
@@ -249,7 +249,9 @@ def _scenarios(plan: Plan) -> dict[str, AnyText]:
         except BadInput as error:
             raise BadInput(plan.path, place, f"{error}") from None
         if type(texts[name]) is not type(texts[plan.scenario]):
-            what = f"{name} and {plan.scenario} are a board's and robots', which have other columns"
+            what = (
+                f"of {name} and {plan.scenario} one is for a board and one for robots, whose columns differ"
+            )
             raise BadInput(plan.path, place, what, "make a campaign of each")
     return texts
 

@@ -36,11 +36,11 @@ from mirotwin.verify.steps.keys import Step
 BOOT_MS = 20_000
 """How long firmware may take until it settles."""
 SETTLED_MS = 300
-"""So long no branch is new once it has settled."""
+"""The firmware has settled when no branch was new for this time."""
 SLICE_MS = 10
 
 Choice = tuple[str, Callable[[int], PutValue]]
-"""The path of a value, and what 16 bits put there."""
+"""The path of a value, and the function from 16 bits to what is put there."""
 
 
 class WiredMachine:
@@ -85,7 +85,7 @@ class WiredMachine:
         assert run.trace is not None
         self.script: Sequence[ScriptItem] = run.trace.script()
         self.begin_tick = self.cpu.cycles * CYCLE_TICKS
-        values = choices_of(device.parts)
+        values = choices_of(device.parts)[:256]  # an input names one by a byte
         self.values = len(values)
         pins = self.board.nets.netlist.free_pins() if isinstance(self.board, WiredBoard) else []
         self.choices = [*values, *((pin, _level) for pin in pins)]
@@ -99,7 +99,7 @@ class WiredMachine:
         self.begin()
 
     def _settled(self, boot_ms: int) -> str:
-        """Runs until the firmware sleeps or settles, or so long; how it is known."""
+        """Runs until the firmware sleeps or settles, or to the limit. Returns which of them it was."""
         cpu, world, clock = self.cpu, self.world, self.world.clock
         edges, seen, new_tick = bytearray(MAP_SIZE), 0, 0
         cpu.watch_edges(memoryview(edges))
@@ -139,7 +139,7 @@ class WiredMachine:
         self.device.put(path, value_of(value), tick)
 
     def begin(self) -> None:
-        """It was put back to where it begins: forgets what it kept."""
+        """Forgets what the last run left: the state was restored to where inputs begin."""
         board = self.board
         board.faults.clear()
         board.log.cut(0)
@@ -154,12 +154,12 @@ class WiredMachine:
     # For the target
 
     def put_at(self, tick: int, which: int, value: int) -> Put:
-        """The same as an action of a stream."""
+        """A put at `tick`, as an action of a stream."""
         path, value_of = self.choices[which]
         return Put(tick, 0, 0, path, value_of(value))
 
     def bits_of(self, which: int, value: PutValue) -> int:
-        """The 16 bits that put `value`, or the next to it."""
+        """The 16 bits that put `value`, or the nearest number to it."""
         values = [self.choices[which][1](bits) for bits in range(0x10000)]
         if value in values:
             return values.index(value)
@@ -210,7 +210,7 @@ def _played(run: Run) -> str:
 
 
 def _let_arrive(world: World) -> None:
-    """On to where all that the steps have sent and done has come."""
+    """Runs on until all that the steps sent and did has arrived."""
     line = world.lines[0]
     while not world.stopped and (
         line.outbox.waiting or line.actions.waiting or line.free_tick() > world.tick
@@ -222,7 +222,7 @@ def _let_arrive(world: World) -> None:
 
 
 def choices_of(parts: dict[str, PartKeys]) -> list[Choice]:
-    """All that a test may put, in the order of parts and keys; what has no numbers, words or bytes is left out."""
+    """All that a test may put, in the order of parts and keys, without types that `choice_of` has no rule for."""
     choices = []
     for name, keys in parts.items():
         for key, kind in keys.PUTS.items():

@@ -67,7 +67,7 @@ def board_capture(job: Job, tell: Callable[[str], None]) -> Iterator[bytes]:
         tell(units_line(job.spec.origin, clock))
     if len(sent) < len(script):
         tell(
-            f"{job.spec.origin}: what was put or done was left out: a capture holds none, a stream file does"
+            f"{job.spec.origin}: left out puts, resets and power: a capture has characters only; use --as stream"
         )
     return to_pcapng(sent)
 

@@ -152,7 +152,7 @@ def export(options: ExportOptions) -> int:
         if options.file != STDIN and is_of_board(given.peek(HEAD_BYTES), format):
             return export_board(options, to)
         if to == "csv":
-            reason = f"{NAMES[format]} of no board, whose nets and values would be in it"
+            reason = f"CSV holds nets and values of a board, and this {NAMES[format]} is of none"
             raise BadInput(given.label, "--as csv", reason, "give a file (not -) of a run of a board")
         if format not in TIMED:
             raise BadInput(

@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Sequence
 from itertools import pairwise
+from operator import attrgetter
 from typing import Any, NamedTuple
 
 import tomli_w
@@ -74,6 +75,7 @@ def board_page(material: Material, first_tick: int, end_tick: int) -> bytes:
         [mark for one in moved if _is_state(one) for mark in _state_marks(one, end_tick)],
         [tick for tick in dict.fromkeys(ticks) if first_tick <= tick < end_tick],
     )
+    marks.sort(key=attrgetter("start_tick"))  # not before: lanes stand in the order of `_marks`
     rows = _rows(wire, scenario.clock, _character_ticks(scenario))
     step = max(scenario.clock * STEP_MS // 1000, window.span // MOST_STEPS)
     data = {
@@ -82,7 +84,7 @@ def board_page(material: Material, first_tick: int, end_tick: int) -> bytes:
         "end": end_tick,
         "step": step,
         "failures": sorted(set(ticks)),
-        "marks": [(one.start_tick, one.lane, one.kind, one.text) for one in sorted(marks, key=_begin)],
+        "marks": [(one.start_tick, one.lane, one.kind, one.text) for one in marks],
         "values": {one.path: (one.ticks, [_plain(value) for value in one.values]) for one in values},
         "ways": {name: [f"{name}.{key}" for key in keys.PATH] for name, keys in cars.items()},
     }
@@ -173,10 +175,6 @@ def _marks(material: Material, wire: Sequence[Transmission], scenario: BoardScen
 
 def _character_ticks(scenario: BoardScenario) -> int:
     return CHARACTER_BITS * (scenario.host_bit_ticks or scenario.clock // 9600)
-
-
-def _begin(mark: LinkMark) -> int:
-    return mark.start_tick
 
 
 def _state_marks(one: Changed, end_tick: int) -> list[LinkMark]:

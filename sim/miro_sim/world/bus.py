@@ -37,9 +37,9 @@ _SOURCES = (1 << (MOST_BOARDS + 1)) - 1  # the boards by their slots, then the P
 class Bus(Wire):
     """`queue`: levels on their way to RXD, tick, source and level; `levels`: those that have come.
 
-    `given`: levels as the sources give them now; `driving`: whose driver is on; `clashed`: several are, and have driven
-    against each other. `said`: characters whose stop bit has not begun by `bus_tick`, up to which everything was
-    exchanged: tick, slot, value, bits, ticks of a bit.
+    `given`: levels that the sources put on the line now; `driving`: whose driver is on; `clashed`: several are, and
+    have driven against each other. `said`: characters sent whose stop bit has not begun by `bus_tick`, up to which
+    everything was exchanged: tick, slot, value, bits, ticks of a bit.
     """
 
     STATE: dict[str, Any] = {
@@ -80,11 +80,11 @@ class Bus(Wire):
             if transceiver is not None:
                 transceiver.join(self.names, slot, self.delay_ticks)
             if device.board.drives_rxd or (found and transceiver is None):
-                what = "something on it drives P3.0 (RXD), or carries its line"
+                what = "a part drives P3.0 (RXD), or stands between it and the line"
                 raise BadInput("", f"board.{self.names[slot]}", what, "wire P3.0 to the line alone")
         if None in self.transceivers and (len(self.devices) > 2 or self.transceivers != [None, None]):
             missing = self.names[self.transceivers.index(None)]
-            what = "has no RS485 transceiver, and more than its serial port and another one is on the line"
+            what = "has no RS485 transceiver; only two boards, both without one, can be wired to each other"
             raise BadInput("", f"board.{missing}", what, 'give each board a part = "rs485"')
         self.levels = self.given = (2 << len(self.devices)) - 1
         self.driving = 0 if self.transceivers[0] is not None else (1 << len(self.devices)) - 1
@@ -115,7 +115,7 @@ class Bus(Wire):
         """Does nothing: RXD is known for the length of the delay."""
 
     def _exchange(self, end: int) -> None:
-        """What all have given before `end` gets on its way, and what comes within the delay to RXD of the others."""
+        """Queues what the boards put on the line before `end`; passes to RXD what arrives within the delay."""
         self._collect(end)
         until = end + self.delay_ticks
         if self.queue:
@@ -130,7 +130,7 @@ class Bus(Wire):
             self._hear_character(value, tick, max(0, tick - bits * bit_ticks), (bits + 1) * bit_ticks)
 
     def _come(self, until: int) -> None:
-        """Levels of the queue before `until` get to RXD: the AND of all others'."""
+        """Passes the queue's levels before `until` to RXD of each board: the AND of all others'."""
         self.queue.sort()
         count = 0
         everything = (2 << len(self.devices)) - 1
@@ -188,7 +188,7 @@ class Bus(Wire):
 
     def _check_rxd_is_free(self) -> None:
         if self.transceivers[0] is None:
-            what = "two boards are wired to each other, and a PC hears them only"
+            what = "two boards are wired to each other, so a PC can listen and not send"
             raise ValueError(f"net{self.index}: {what}; give each a part rs485")
 
     def _takes(self, first_tick: int, end_tick: int, characters: int) -> bool:

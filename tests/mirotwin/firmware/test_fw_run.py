@@ -289,7 +289,7 @@ def test_registers_that_the_chip_lacks_are_reported_at_the_end_with_the_chip_tha
     assert (
         'the at89c52 lacks E6h (ISP/IAP, the data flash), accessed 2 times; chip = "stc89c52" has them' in err
     )
-    modes = "lacks 91h (P0M0 to P2M1, modes of ports), accessed once; STC12, STC15 have, and no chip here"
+    modes = "lacks 91h (P0M0 to P2M1, modes of ports), accessed once; no chip here has it, STC12, STC15 have"
     assert f"the at89c52 {modes}" in err
     assert "the at89c52 lacks F8h, accessed once; they read FFh" in err
 

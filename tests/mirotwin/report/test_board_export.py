@@ -69,7 +69,7 @@ def test_a_capture_holds_the_characters_and_says_what_it_leaves_out(export):
         sent = list(iterate(given.read, "run.pcapng"))
     assert b"".join(one.data for one in sent if one.direction == "<") == b"Rhi"
     assert [one.data for one in sent if one.direction == ">"] == [b"hi"]
-    assert "what was put or done was left out: a capture holds none, a stream file does" in said
+    assert "left out puts, resets and power: a capture has characters only; use --as stream" in said
     assert "ticks of its 11059200 Hz crystal are given in those of 24000000 Hz" in said
 
 
@@ -94,5 +94,5 @@ def test_foxglove_gets_the_values_as_they_are_recorded(export):
 def test_csv_of_robots_is_refused_in_one_line(tmp_path, mirotwin):
     (tmp_path / "robots.stream").write_text("# mirotwin stream 1\n1000 > 55\n")
     said = mirotwin.refuses("export", tmp_path / "robots.stream", "--out", tmp_path / "x.csv")
-    assert "--as csv: stream file of no board, whose nets and values would be in it" in said
+    assert "--as csv: CSV holds nets and values of a board, and this stream file is of none" in said
     assert not (tmp_path / "x.csv").exists()

@@ -199,7 +199,7 @@ def test_both_engines_do_the_same():
 
 def test_what_carries_no_bus_is_refused():
     plain, radio = board({}), board({"radio": {"part": "bluetooth", "pins": {"rxd": "P3.1", "txd": "P3.0"}}})
-    for spec, said in ((plain, "has no RS485 transceiver"), (radio, "carries its line")):
+    for spec, said in ((plain, "has no RS485 transceiver"), (radio, "stands between it and the line")):
         others = {"b1": OtherBoard(board=spec, image=hex_of(LISTENS))}
         scenario = BoardScenario(board=board({"bus": BUS}), board_name="b0", others=others)
         with pytest.raises(BadInput, match=said):
