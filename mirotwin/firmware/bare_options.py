@@ -26,7 +26,7 @@ from mirotwin.firmware.code_place import address_of, check_code_at, place_of
 from mirotwin.runs.spec import RunSpec
 from mirotwin.shell.command import Option, Options, Word
 from mirotwin.shell.firmware_image import load_firmware
-from mirotwin.shell.options import IMAGE, NAME, StackFrom, Whole
+from mirotwin.shell.options import BOARD, IMAGE, NAME, StackFrom, Whole
 from mirotwin.shell.program import complain
 from mirotwin.shell.times import Time, TimeType
 from mirotwin.shell.verdicts import exit_code
@@ -66,10 +66,8 @@ class BareOptions(Options, frozen=True, kw_only=True):
 
     board: Annotated[
         str | None,
-        Option(
-            type=NAME,
-            metavar="BOARD",
-            help="Board on which the image runs: a NAME.board.toml, or one of `mirotwin boards`. Default: the bare"
+        BOARD.saying(
+            "Board on which the image runs: a NAME.board.toml, or one of `mirotwin boards`. Default: the bare"
             " processor with 64 KB of external RAM.",
         ),
     ] = None

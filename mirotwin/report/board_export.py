@@ -11,15 +11,12 @@ from typing import Any
 from msgspec.structs import replace
 
 from miro_exact.bad_input import BadInput
-from miro_exact.clock import TICKS_PER_SECOND
 from miro_protocol import stream
 from miro_protocol.actions import ScriptItem
 from miro_protocol.stream import StreamError
-from miro_protocol.transmission import Transmission
 from miro_sim.scenario.board import BoardScenario
 from miro_sim.scenario.board_scenario import tables_of_board
-from mirotwin.recording.capture.recorded import in_usual_ticks, transmissions_of, units_line
-from mirotwin.recording.capture.render import to_pcapng
+from mirotwin.recording.capture.recorded import transmissions_of
 from mirotwin.recording.container import RecordingError
 from mirotwin.recording.messages import Messages
 from mirotwin.runs.board_case import is_for_board
@@ -57,19 +54,6 @@ def board_stream(job: Job) -> str:
         more["expect"] = scenario.expect
     more["scenario"] = tables_of_board(ends)
     return stream_text(_script(job), spec.image, {"seed": spec.seed}, job.case.verdict, more)
-
-
-def board_capture(job: Job, tell: Callable[[str], None]) -> Iterator[bytes]:
-    """The characters each way as pcapng; `tell` gets what a capture does not hold."""
-    script, clock = _script(job), job.spec.scenario.clock
-    sent = [in_usual_ticks(item, clock) for item in script if isinstance(item, Transmission)]
-    if clock != TICKS_PER_SECOND:
-        tell(units_line(job.spec.origin, clock))
-    if len(sent) < len(script):
-        tell(
-            f"{job.spec.origin}: left out puts, resets and power: a capture has characters only; use --as stream"
-        )
-    return to_pcapng(sent)
 
 
 def _script(job: Job) -> Sequence[ScriptItem]:

@@ -21,7 +21,7 @@ from mirotwin.recording.capture.input import STDIN, Input
 from mirotwin.recording.capture.layout import look
 from mirotwin.recording.capture.source import READ_ERRORS, open_source
 from mirotwin.recording.decode_command import FORMAT
-from mirotwin.report.board_export import HEAD_BYTES, board_capture, board_csv, board_stream, is_of_board
+from mirotwin.report.board_export import HEAD_BYTES, board_csv, board_stream, is_of_board
 from mirotwin.runs.job import load_job
 from mirotwin.shell.command import Argument, Option, Options, command_of
 from mirotwin.shell.console import show
@@ -149,7 +149,7 @@ def export(options: ExportOptions) -> int:
         format = options.format or detect(given.peek())[0]
         if to == "foxglove":
             return export_foxglove(given, format, out, quiet)
-        if options.file != STDIN and is_of_board(given.peek(HEAD_BYTES), format):
+        if to != "pcapng" and options.file != STDIN and is_of_board(given.peek(HEAD_BYTES), format):
             return export_board(options, to)
         if to == "csv":
             reason = f"CSV holds nets and values of a board, and this {NAMES[format]} is of none"
@@ -188,7 +188,7 @@ def export_board(options: ExportOptions, to: str) -> int:
                 check_single(job.spec.scenario, options.file, "CSV")
             pieces = board_csv(job, bar.to)
         else:
-            pieces = board_capture(job, complain) if to == "pcapng" else [board_stream(job).encode()]
+            pieces = [board_stream(job).encode()]
         _write(options.out, pieces)
     if not options.quiet and options.out != STDIN:
         line = f"; mirotwin replay {options.out} --firmware IMAGE plays it again" if to == "stream" else ""

@@ -97,9 +97,8 @@ def check_script(script: Sequence[ScriptItem], scenario: Scenario | None = None)
                 raise BadInput("", f"tick {item.tick}", reason, "move it back")
             before[item.network] = item
         elif isinstance(item, Put):
-            raise BadInput(
-                "", f"tick {item.tick}", "puts a value of a part, and robots have none", "leave it out"
-            )
+            reason = f"{item.path} is of a part or a pin of a board, and robots have none"
+            raise BadInput("", f"tick {item.tick}", reason, "leave it out")
         elif isinstance(item, Reset | Power) and scenario is not None:
             slots = [robot.slot for robot in scenario.networks[item.network].robot]
             if item.slot not in slots:

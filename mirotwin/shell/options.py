@@ -103,6 +103,7 @@ IMAGE = "Firmware image"
 
 SEED = Option("--seed", type=Whole(0, MAX_SEED), help="Master seed of all noise.")
 SET = Option("--set", metavar="KEY=VALUE", help="A key of the scenario, as for `run`; may be repeated.")
+BOARD = Option("--board", metavar="BOARD", type=NAME, help="A NAME.board.toml, or one of `mirotwin boards`.")
 FIRMWARE = Option(
     "--firmware",
     metavar="IMAGE.ihx",

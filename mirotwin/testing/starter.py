@@ -11,7 +11,7 @@ import click
 from miro_exact.bad_input import BadInput, did_you_mean, shortened
 from miro_robot.firmware import image_path, source_folder
 from mirotwin.shell.command import Argument, Option, Options, command_of, operand, shell_line
-from mirotwin.shell.options import FORCE, PATH
+from mirotwin.shell.options import BOARD, FORCE, PATH
 from mirotwin.shell.outputs import reason_of, some, write_files
 from mirotwin.testing import origin
 
@@ -181,13 +181,9 @@ class InitOptions(Options, frozen=True, kw_only=True):
         bool, Option(help="No C sources: the tests run on the robot's own firmware, or on an image of yours.")
     ] = False
     board: Annotated[
-        str,
-        Option(
-            metavar="NAME",
-            help="Not the robot, but a board of the examples, such as car.",
-            apart="without_firmware",
-        ),
-    ] = ""
+        str | None,
+        BOARD.saying("Not the robot, but a board of the examples, such as car.", apart="without_firmware"),
+    ] = None
     source: Annotated[
         str,
         Option(

@@ -139,7 +139,7 @@ def test_a_stream_needs_the_length_of_a_bit(mirotwin, scenario, tmp_path):
 def test_a_put_in_a_stream_for_robots_is_refused(mirotwin, tmp_path):
     path = tmp_path / "robots.stream"
     path.write_text("# mirotwin stream 3\n5 * eyes.distance_cm = 60\n")
-    assert "puts a value of a part, and robots have none" in mirotwin.refuses("replay", path)
+    assert "is of a part or a pin of a board, and robots have none" in mirotwin.refuses("replay", path)
 
 
 def test_a_case_of_a_board_gives_its_verdict_again(mirotwin, tmp_path):

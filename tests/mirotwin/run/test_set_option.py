@@ -186,7 +186,7 @@ def test_settings_of_the_header_are_made_before_those_of_the_command(mirotwin, t
         (in_header(SHORT), "2000000 *@0/1 reset 1", "tick 2000000: no robot in slot 1; there is 0, 2"),
         (in_header(SHORT), "4900000 *@0 radio up", "tick 4900000: ends at tick 4900000, but the scenario ends at"),
         (in_header(SHORT), "2000000 *@1 radio up", "tick 2000000: network 1 does not exist; there is 1"),
-        ("", "2000000 * P1.0 1", ":6:1: an action, which this command does not support; `mirotwin fw run"),
+        ("", "2000000 * P1.0 1", "tick 2000000: P1.0 is of a part or a pin of a board, and robots have none"),
         ("", "1701700 >@31 55\n1800000 >@32 55", "tick 1800000: network 32 does not exist; there are 32"),
         ("", "1701700 >@1 55\n1702000 >@1 55", "tick 1702000: starts before the transmission of tick 1701700"),
     ],
