@@ -25,7 +25,7 @@ EXAMPLES = {
     "laws": "Two laws in a distribution of their own, to install.",
     "checks": "A check in a distribution of its own, to install.",
     "fuzz-slip": "An 8051 firmware that is no robot, its wire format, its check.",
-    "boards": "8051 boards, firmware, tests: car, line follower, rover, Modbus.",
+    "boards": "8051 boards, firmware, tests: cars, line follower, Modbus, RS485.",
     "foxglove": "A layout for Foxglove.",
     "vscode": "The extension for VS Code: debugging firmware, backwards too.",
 }

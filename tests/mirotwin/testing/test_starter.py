@@ -279,22 +279,30 @@ def test_a_project_of_a_board_passes_its_tests_with_pytest_alone(mirotwin, tmp_p
     } <= found
     assert f"next: cd {tmp_path}/mine && pytest" in out
     scenarios = len(list((tmp_path / "mine").glob("*.scenario.toml")))
-    assert len(list((tmp_path / "mine").glob("test_*.py"))) == 1
+    in_python = {"modbus": 4, "monitor": 0}.get(board, 3)  # `board` of a test in Python is one board
+    assert len(list((tmp_path / "mine").glob("test_*.py"))) == (in_python > 0)
     assert done.returncode == 0, done.stdout + done.stderr
-    assert re.search(r"(\d+) passed in", done.stdout)[1] == f"{scenarios + 3 + (board == 'modbus')}"
+    assert re.search(r"(\d+) passed in", done.stdout)[1] == f"{scenarios + in_python}"
 
 
 @pytest.mark.parametrize(
     ("words", "line"),
     [
         (("--board", "cart"), "--board: no such board 'cart'; did you mean car?"),
-        (("--board", "x"), "--board: no such board 'x'; there are car, follower, modbus, rover"),
-        (("--board", "../hil"), "--board: no such board '../hil'; there are car, follower, modbus, rover"),
+        (("--board", "x"), f"--board: no such board 'x'; there are {', '.join(BOARDS)}"),
+        (("--board", "../hil"), f"--board: no such board '../hil'; there are {', '.join(BOARDS)}"),
     ],
 )
 def test_a_board_that_is_no_example_is_answered_with_those_there_are(mirotwin, tmp_path, words, line):
     assert mirotwin.refuses("init", tmp_path / "mine", *words) == line
     assert os.listdir(tmp_path) == []
+
+
+def test_the_page_of_ci_names_all_boards_that_a_project_begins_with():
+    page = (Path(__file__).parents[3] / "docs/howto/ci.md").read_text("utf-8")
+
+    sentence = re.search(r"For a board of your own, .*?:", page, re.DOTALL)[0]
+    assert re.findall(r"`(\w+)`", sentence) == BOARDS
 
 
 def test_a_board_has_its_own_firmware(mirotwin, tmp_path):
