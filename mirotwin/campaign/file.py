@@ -51,6 +51,10 @@ class Document(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
     random: Random | None = None
 
 
+_OF_OTHERS = {"board", "chip", "crystal_hz", "duration_s", "network"}
+"""Keys at the top of a scenario or of a board file."""
+
+
 def builtin_names() -> list[str]:
     """Campaigns that are part of the program: `mirotwin campaign bench1`."""
     return sorted(path.stem for path in BUILTIN.glob("*.toml"))
@@ -84,6 +88,9 @@ def _parsed(text: str, path: Path) -> Plan:
     with BadInput.at(path):
         raw = tables(text)
         check_numbers(raw)
+        if SCENARIO not in raw and _OF_OTHERS & raw.keys():
+            remedy = f'write scenario = "{path.name}" into a campaign file beside it'
+            raise BadInput("", "", "is no campaign, but a scenario or a board", remedy)
         document = struct_of(raw, Document)
         design = _design(document, path)
         scenario, firmware = (

@@ -364,6 +364,9 @@ _WRITE_TIMES = "of bytes alone make a stream file, whose lines are `TICK > HEX B
 def _stream(data: bytes, path: str) -> stream.StreamFile:
     """The stream file with this content. Raises BadInput for another format, StreamError for what is wrong in it."""
     format, _ = detect(data[:HEAD_BYTES])
+    if path.endswith(".toml") and format != "stream":
+        reason = "is no run, but what one is made from"
+        raise BadInput(path, "", reason, "run it with `mirotwin run`, and give the run.mcap that it writes")
     if format == "pcapng":
         line = command_line("export", operand(path), "--out", "NAME.stream")
         reason = "a capture, which cannot be replayed"

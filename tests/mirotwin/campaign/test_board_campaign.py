@@ -224,6 +224,13 @@ def test_what_cannot_be_varied_or_read_is_one_line(mirotwin, tmp_path, monkeypat
     assert sorted(path.suffix for path in Path().iterdir()) == [".hex", ".hex", ".toml", ".toml", ".toml"]
 
 
+@pytest.mark.parametrize("name", ["lamp.board.toml", "lamp.scenario.toml"])
+def test_a_board_or_a_scenario_is_no_campaign(mirotwin, here, monkeypatch, name):
+    monkeypatch.chdir(here)
+    line = f'{name}: is no campaign, but a scenario or a board; write scenario = "'
+    assert mirotwin.refuses("campaign", name).startswith(line)
+
+
 def test_scenarios_with_other_steps_share_one_order_of_columns(here):
     more = SCENARIO.replace("[[step]]", "[[step]]\npause_ms = 1\n[[step]]", 1)
     (here / "more.scenario.toml").write_text(more)

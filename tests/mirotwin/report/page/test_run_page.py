@@ -266,6 +266,7 @@ def test_a_page_that_is_too_large_is_refused_and_the_remedy_works(two, tmp_path,
         (["nothing"], "nothing: No such file or directory"),
         (["empty"], "empty: holds neither run.mcap nor case.stream; give a run's folder"),
         (["text.txt"], "text.txt:1:1: 'hello' is not a tick"),
+        (["a.board.toml"], "a.board.toml: is no run, but what one is made from; run it with `mirotwin run`"),
         (["gone.parquet"], "gone.parquet: No such file or directory"),
         (["fig6", "--from", "9s"], "--from 216000000t: the recording goes from tick 0 to"),
         (["fig6", "--from", "1s", "--to", "1s"], "the window is empty; --to must be later"),
@@ -278,6 +279,7 @@ def test_bad_input_is_one_line_and_nothing_is_written(arguments, said, fig6, tmp
     monkeypatch.chdir(tmp_path)
     (tmp_path / "empty").mkdir()
     (tmp_path / "text.txt").write_text("hello\n")
+    (tmp_path / "a.board.toml").write_text("crystal_hz = 12_000_000\n")
     shutil.copytree(fig6, tmp_path / "fig6")
     assert said in mirotwin.refuses("report", *arguments, "-o", "page.html", "-q")
     assert not (tmp_path / "page.html").exists()
