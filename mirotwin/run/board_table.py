@@ -30,8 +30,7 @@ def _serial_text(summary: BoardSummary, serial: SerialCounts) -> str:
         text += f"; the firmware has {summary.serial.firmware_baud} baud, [serial] has another rate"
     if not serial.tail:
         return text
-    shown = serial.tail.decode("ascii", "backslashreplace")
-    return f"{text}; the last: {'..' if serial.from_board > len(serial.tail) else ''}{shown!r}"
+    return f"{text}; the last: {'..' if serial.from_board > len(serial.tail) else ''}{serial.tail.decode('latin-1')!a}"
 
 
 def _by_part(summary: BoardSummary) -> dict[str, list[str]]:

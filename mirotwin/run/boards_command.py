@@ -239,7 +239,7 @@ def _range(kind: inspect.IntType | inspect.FloatType) -> str:
     most = kind.lt if kind.le is None else kind.le
     above, below = "above " * (kind.gt is not None), "below " * (kind.lt is not None)
     if least is not None and most is not None:
-        return f", {above}{least:g} to {below}{most:g}"
+        return f", {above}{least:.12g} to {below}{most:.12g}"
     if least is not None:
-        return f", {above or 'at least '}{least:g}"
-    return f", {below or 'at most '}{most:g}" if most is not None else ""
+        return f", {above or 'at least '}{least:.12g}"
+    return f", {below or 'at most '}{most:.12g}" if most is not None else ""

@@ -67,6 +67,10 @@ def test_a_part_of_a_file_is_shown(mirotwin, tmp_path):
     assert "from: sonar.py:Sonar" in out
 
 
+def test_limits_are_shown_as_whole_numbers(mirotwin):
+    assert "a whole number, 1200 to 1382400 " in mirotwin.succeeds("boards", "show", "bluetooth")
+
+
 @pytest.mark.parametrize(
     ("arguments", "message"),
     [
