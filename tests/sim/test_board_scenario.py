@@ -55,6 +55,13 @@ def test_scenarios_of_robots_are_read_as_before():
     assert not isinstance(load_any("fig6", ("duration_s=1",)), BoardText)
 
 
+def test_a_board_that_is_set_in_a_scenario_of_robots_is_refused():
+    with pytest.raises(
+        BadInput, match=r"board: is for a scenario of a board, and this one is for robots; remove it"
+    ):
+        load_any("fig6", ("board.crystal_hz=1",))
+
+
 def test_a_command_for_robots_refuses_it(tmp_path):
     with pytest.raises(BadInput, match=r"board: the scenario is for a board, and this command takes robots"):
         load(str(board_folder(tmp_path)))

@@ -70,6 +70,23 @@ def test_a_setting_reaches_a_board_and_a_part(folder):
 
 
 @pytest.mark.parametrize(
+    ("setting", "said"),
+    [
+        ("board.meter.file=other.board.toml", "cannot be set; change it in the scenario's file"),
+        ("board.panel.firmware=other.ihx", "cannot be set; change it in the scenario's file"),
+        ("board.metre.firmware=other.ihx", "cannot be set; change it in the scenario's file"),
+        ("board.parts.bus.re=0", "board.parts.bus: unknown key; keys here: file"),
+    ],
+)
+def test_a_setting_that_reaches_no_board_is_refused(folder, setting, said):
+    path = folder / "two.scenario.toml"
+    path.write_text(TWO)
+    with pytest.raises(BadInput) as found:
+        load_any(str(path), [setting])
+    assert said in str(found.value)
+
+
+@pytest.mark.parametrize(
     ("change", "said"),
     [
         (
@@ -85,6 +102,15 @@ def test_a_setting_reaches_a_board_and_a_part(folder):
         ),
         (("duration_s = 0.1", "duration_s = 0.1\nput = { panel.buss.broken = true }"), "no part 'buss'"),
         (('firmware = "meter.ihx"', 'firmware = "meter.ihx"\ncolour = 1'), "unknown key"),
+        (
+            ('file = "meter.board.toml"', 'fil = "meter.board.toml"'),
+            "board.meter.fil: unknown key; did you mean file?",
+        ),
+        (('file = "meter.board.toml"', ""), "board.meter.file: this key is missing; add file ="),
+        (
+            ("duration_s = 0.1", "duration_s = 0.1\nput = { panel.bus.broken = 3 }"),
+            "put.panel.bus.broken: bus.broken = 3",
+        ),
     ],
 )
 def test_what_is_wrong_is_one_line_with_its_place(folder, change, said):

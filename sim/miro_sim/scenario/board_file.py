@@ -76,6 +76,9 @@ class _File(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_only=Tru
         return self.xram or ("internal" if CHIPS[self.chip].xram_bytes else "none")
 
 
+KEYS = _File.__struct_encode_fields__
+
+
 # Finding and reading
 
 
@@ -232,7 +235,7 @@ def _part(name: str, table: dict[str, Any]) -> PartSpec:
         except PluginError as error:
             remedy = error.remedy
             if error.what.endswith("one of the choices"):
-                remedy += ", or bring your own by --part FILE.py:CLASS"
+                remedy += ", or your own, with a command that takes --part FILE.py:CLASS"
             raise BoardError("", "part", error.what, remedy) from error
         own = {key: value for key, value in table.items() if key != "pins"}
         with BoardError.at("", "pins"):
@@ -251,7 +254,7 @@ def keys_of(struct: type[PartKeys], table: dict[str, Any]) -> PartKeys:
         elif error.what == "unknown key" and not struct.__struct_encode_fields__:
             remedy = "this part has no keys but part and pins"
         else:
-            raise
+            remedy = error.remedy or f"see `mirotwin boards show {struct.__struct_config__.tag}`"
         raise BoardError("", error.place, error.what, remedy) from None
     except (Exception, SystemExit) as error:
         what = f"part {struct.__struct_config__.tag!r} cannot check its keys: {raised(error)}"

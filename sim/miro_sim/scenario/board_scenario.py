@@ -42,7 +42,7 @@ from miro_robot.parts.values import checked_put, leaves
 from miro_sim.scenario import file as robots_file
 from miro_sim.scenario.base import SCENARIO, is_path, with_base
 from miro_sim.scenario.board import MOST_BOARDS, BoardScenario, OtherBoard
-from miro_sim.scenario.board_file import ENDING, board_of_table, builtin_boards, load_board, table_of
+from miro_sim.scenario.board_file import ENDING, KEYS, board_of_table, builtin_boards, load_board, table_of
 from miro_sim.scenario.errors import ScenarioError
 from miro_sim.scenario.file import ReadText, ScenarioText, builtin_names, source_text, tables_of
 from miro_sim.scenario.keys import Duration, Name
@@ -169,9 +169,10 @@ def _complete(raw: Table, origin: str) -> Table:
 
 
 def _is_line(board: Table) -> bool:
-    """Whether these are several boards on one line, each in a table of its name."""
-    return bool(board) and all(
-        isinstance(one, dict) and ("file" in one or BOARD in one) for one in board.values()
+    """Whether these are several boards on one line, each in a table of its name: one at least says which it is."""
+    tables = [one for name, one in board.items() if name not in KEYS]
+    return all(isinstance(one, dict) for one in board.values()) and any(
+        "file" in one or BOARD in one for one in tables
     )
 
 
@@ -277,6 +278,11 @@ def _line(tables: Table) -> tuple[str, BoardSpec, dict[str, OtherBoard]]:
                     "", "", "cannot be the name of a board", "use letters, digits and _, not a digit first"
                 )
             one = struct_of(tables[name], _OnLine)
+            for key in ("file", FIRMWARE):  # what is in the file has been read
+                if getattr(one, key):
+                    raise BadInput("", key, "cannot be set", "change it in the scenario's file")
+            if not one.board:
+                raise BadInput("", "file", "this key is missing", 'add file = "NAME.board.toml"')
             with ScenarioError.at("", BOARD):
                 spec = board_of_table(one.board, "", name)
             boards[name], images[name] = _strapped(spec, one.straps), one.image
@@ -308,8 +314,8 @@ def _puts_on_line(name: str, board: BoardSpec, others: dict[str, OtherBoard], ta
         if one not in boards:
             remedy = did_you_mean(one, boards, f"the boards are {', '.join(boards)}")
             raise BadInput("", f"put.{path}", f"there is no board {one!r}", remedy)
-        with ScenarioError.at("", f"put.{one}"):
-            puts.update({f"{one}.{own}": taken for own, taken in _puts(boards[one], {rest: value}).items()})
+        taken = _puts(boards[one], {rest: value}, f"put.{one}")
+        puts.update({f"{one}.{own}": value for own, value in taken.items()})
     return puts
 
 
@@ -334,7 +340,7 @@ def _strapped(board: BoardSpec, levels: dict[str, int]) -> BoardSpec:
     return replace(board, straps=straps)
 
 
-def _puts(board: BoardSpec, table: Table) -> dict[str, Any]:
+def _puts(board: BoardSpec, table: Table, place: str = "put") -> dict[str, Any]:
     """The values in `put`, by PART.KEY, as the parts take them."""
     parts = {name: part.keys for name, part in board.parts.items()}
     pins = resolve(board).free_pins()
@@ -346,7 +352,7 @@ def _puts(board: BoardSpec, table: Table) -> dict[str, Any]:
                 raise ValueError("something is wired to it; put a value of that")
         except ValueError as error:
             reason, _, remedy = f"{error}".removeprefix(f"{path}: ").partition("; ")
-            raise BadInput("", f"put.{path}", reason, remedy) from None
+            raise BadInput("", f"{place}.{path}", reason, remedy) from None
     return puts
 
 

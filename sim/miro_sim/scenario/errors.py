@@ -96,6 +96,8 @@ def explained(what: str, path: str, value: Any, remedy: str) -> tuple[str, str]:
         want = " or ".join(
             TYPE_NAMES.get(name, name) for name in wrong_type[1].split(" | ") if name != "null"
         )
+        if want == TYPE_NAMES["array"] and not isinstance(value, dict):
+            want = toml_text.TYPE_NAMES["array"]
         got = TYPE_NAMES.get(wrong_type[2], f"a {wrong_type[2]}")
         what = f"expected {want}{_unit_of(path)}, got {got}{_shown(value)}"
         if wrong_type[1] == "array" and isinstance(value, dict):
@@ -110,6 +112,7 @@ def explained(what: str, path: str, value: Any, remedy: str) -> tuple[str, str]:
         return f"{value!r} is not bytes in hex digits", "use two digits a byte, as 0a ff"
     if "matching regex" in what:
         return f"{value!r} is not a name", "use a-z, 0-9, - and _, at most 64 characters"
+    what = what.replace("`array`", "a list")
     return what[:1].lower() + what[1:], remedy
 
 

@@ -181,6 +181,9 @@ def _converted(raw: dict[str, Any], origin: str) -> Scenario:
     """The scenario of complete tables. Raises ScenarioError."""
     from miro_sim.scenario.build import check_robots  # needs hot modules: not before the engine was chosen
 
+    if "board" in raw and "network" in raw:
+        what = "is for a scenario of a board, and this one is for robots"
+        raise ScenarioError(origin, "board", what, "remove it")
     if "board" in raw:
         what = "the scenario is for a board, and this command takes robots"
         raise ScenarioError(origin, "board", what, "`mirotwin run` and `mirotwin test` take it")

@@ -8,6 +8,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
+from miro_exact.bad_input import BadInput
 from miro_exact.plugins import PluginError
 from miro_robot.build import board_of
 from miro_sim.plant.car import Car
@@ -289,3 +290,24 @@ def test_a_board_that_is_wired_wrongly_says_so_in_one_line(right, wrong, message
         board_of(spec, image_of("SJMP $"), 0)
     assert message in f"{refused.value}"
     assert "repair" not in f"{refused.value}"
+
+
+@pytest.mark.parametrize(
+    ("lines", "message"),
+    [
+        (
+            "lines = [[0, 0]]",
+            r"parts.car.lines\[0\]\[0\]: expected a list, got a whole number \(0\); see `mirotwin",
+        ),
+        ("lines = [[[0, 0]]]", r"parts.car.lines\[0\]: expected a list of length >= 2; see `mirotwin"),
+        (
+            "walls = [[0, 0, 0, 0]]",
+            r"parts.car: walls: one at \(0, 0\) is shorter than 0.01 cm; see `mirotwin",
+        ),
+    ],
+)
+def test_what_is_drawn_wrongly_on_the_plane_is_said_with_its_place_and_where_to_look(lines, message):
+    kept = [line for line in BOARD.read_text().splitlines() if not line.startswith("walls")]
+    text = "\n".join(kept).replace('part = "car"', f'part = "car"\n{lines}')
+    with pytest.raises(BadInput, match=message + " boards show car`"):
+        board_of_table(tomllib.loads(text), "hall.board.toml")
