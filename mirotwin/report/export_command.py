@@ -152,7 +152,9 @@ def export(options: ExportOptions) -> int:
         if to != "pcapng" and options.file != STDIN and is_of_board(given.peek(HEAD_BYTES), format):
             return export_board(options, to)
         if to == "csv":
-            reason = f"CSV holds nets and values of a board, and this {NAMES[format]} is of none"
+            reason = f"CSV holds nets and values of a board, and no board is in it ({NAMES[format]})"
+            if options.file == STDIN:
+                reason = "CSV is made by running a board again, which takes a file"
             raise BadInput(given.label, "--as csv", reason, "give a file (not -) of a run of a board")
         if format not in TIMED:
             raise BadInput(

@@ -67,13 +67,14 @@ def board_page(material: Material, first_tick: int, end_tick: int) -> bytes:
     marks = _marks(material, wire, scenario)
     marks = [one for one in marks if first_tick <= one.end_tick and one.start_tick < end_tick]
     ticks = [*(one.tick for one in again.result.failures), *(fault.tick for _, _, fault in again.faults)]
+    ticks = sorted({tick for tick in ticks if first_tick <= tick <= end_tick})
     figures = board_figures(
         window,
         marks,
         pins,
         curves,
         [mark for one in moved if _is_state(one) for mark in _state_marks(one, end_tick)],
-        [tick for tick in dict.fromkeys(ticks) if first_tick <= tick < end_tick],
+        ticks,
     )
     marks.sort(key=attrgetter("start_tick"))  # not before: lanes stand in the order of `_marks`
     rows = _rows(wire, scenario.clock, _character_ticks(scenario))
@@ -83,7 +84,7 @@ def board_page(material: Material, first_tick: int, end_tick: int) -> bytes:
         "first": first_tick,
         "end": end_tick,
         "step": step,
-        "failures": sorted(set(ticks)),
+        "failures": ticks,
         "marks": [(one.start_tick, one.lane, one.kind, one.text) for one in marks],
         "values": {one.path: (one.ticks, [_plain(value) for value in one.values]) for one in values},
         "ways": {name: [f"{name}.{key}" for key in keys.PATH] for name, keys in cars.items()},

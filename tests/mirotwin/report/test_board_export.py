@@ -94,5 +94,5 @@ def test_foxglove_gets_the_values_as_they_are_recorded(export):
 def test_csv_of_robots_is_refused_in_one_line(tmp_path, mirotwin):
     (tmp_path / "robots.stream").write_text("# mirotwin stream 1\n1000 > 55\n")
     said = mirotwin.refuses("export", tmp_path / "robots.stream", "--out", tmp_path / "x.csv")
-    assert "--as csv: CSV holds nets and values of a board, and this stream file is of none" in said
+    assert "--as csv: CSV holds nets and values of a board, and no board is in it (stream file)" in said
     assert not (tmp_path / "x.csv").exists()

@@ -229,6 +229,16 @@ def test_a_window_shows_that_time_alone(lamp, tmp_path, mirotwin):
     ] == []
 
 
+def test_a_window_after_a_failure_marks_none(tmp_path, mirotwin):
+    scenario = board_folder(tmp_path, SCENARIO + '[expect]\nvalue_at_most = { "lamp.flashes" = 0 }\n')
+    assert mirotwin("run", scenario, "--out", tmp_path / "run", "-q")[0] == 1
+    found = []
+    for window in ((), ("--from", "0.4s")):
+        mirotwin.succeeds("report", tmp_path / "run", "-o", tmp_path / "page.html", "-q", "--force", *window)
+        found.append(len(Markup(tmp_path / "page.html").data["failures"]))
+    assert found == [1, 0]
+
+
 def test_edges_too_close_to_be_drawn_are_said_and_filled(tmp_path, mirotwin):
     scenario = board_folder(tmp_path, SCENARIO, program=PULSES)
     mirotwin.succeeds("run", scenario, "--out", tmp_path / "run", "-q")
