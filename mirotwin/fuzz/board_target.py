@@ -294,7 +294,7 @@ class BoardTarget(Target):
         named = [path for path, _ in self.wired.choices[:values]]
         if pins:
             named.append(amount(pins, "pin that nothing drives", "pins that nothing drives"))
-        puts = ", ".join(named)
+        puts = ", ".join(named) if self.input == "session" else ""
         return f"inputs begin at {at(begin_tick, clock)}: {self.wired.how}; they put {puts or 'nothing'}"
 
     def chip_notes(self) -> list[str]:

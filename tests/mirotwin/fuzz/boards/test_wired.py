@@ -158,6 +158,13 @@ def test_an_input_puts_levels_on_pins_that_nothing_drives_and_a_stream_does_so_t
     assert parse(without).script() == parse(stream).script()
 
 
+@pytest.mark.parametrize(("kind", "puts"), [("session", "key.pressed, 27 pins"), ("bytes", "nothing")])
+def test_the_note_names_what_inputs_of_a_class_put(tmp_path, kind, puts):
+    text = load_any(str(board_folder(tmp_path)))
+    target = BoardTarget(image_for(text), kind, machine=WiredMachine(text.scenario, image_for(text)))
+    assert f"; they put {puts}" in target.note()
+
+
 def test_a_pin_with_something_wired_to_it_is_put_by_no_scenario(tmp_path):
     path = board_folder(tmp_path)
     path.write_text(path.read_text().replace("put = { key.pressed = true }", "put = { P2.0 = 1 }"))
