@@ -183,7 +183,8 @@ class _Reader:
                 names.setdefault(segment.name, Symbol(segment.first, "code"))  # of a library, of constants
             if segment.memory == "IDATA" and segment.name in ("?STACK", "_STACK"):
                 begin = segment.first + (segment.name == "_STACK")  # Raisonance's is what SP is set to
-                names[STACK] = Symbol(begin, "iram")
+                if begin <= 0xFF:  # what lies beyond is damage
+                    names[STACK] = Symbol(begin, "iram")
         in_c = {place.area.rpartition("?")[2].upper() for place, _ in found}
         lines = [
             (

@@ -160,6 +160,12 @@ def test_the_stack_begins_at_its_segment(project, text):
     assert blink(project, text).symbols.stack == (0x21, 0xFF)
 
 
+def test_a_stack_beyond_internal_ram_is_damage_and_the_start_up_code_says_where_it_is(project):
+    symbols = blink(project, BL51.replace("IDATA   0021H", "IDATA   FFFFH")).symbols
+    assert symbols.stack == (0x21, 0xFF)
+    assert symbols.stack_source.startswith("MOV SP,#20h")
+
+
 @pytest.mark.parametrize("text", [BL51, LX51])
 def test_lines_belong_to_the_c_file_of_the_module(project, text):
     info = DebugInfo.of(blink(project, text))
