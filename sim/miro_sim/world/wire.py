@@ -34,7 +34,7 @@ _STOP = CHARACTER_BITS - 1
 class BoardAlone(Device):
     """A board on a wire. `parts`: the keys of those that are on it, by name. `reads`: part and key of each value by
     its path. `changes`: for who watches it. `line`: of the first of several boards, all of them by their names.
-    `put_stopped`: whether a put has stopped the run; its next piece tells.
+    `put_stopped`: a put has stopped the run; `run` returns it next.
     """
 
     NOT_STATE = ("sample_ticks", "put_stopped", "parts", "reads", "changes", "line")
@@ -80,34 +80,26 @@ class BoardAlone(Device):
         return board.changes, rest
 
     def check_put(self, path: str, value: PutValue) -> None:
-        board, path = self.at(path)
-        if board is not self:
-            board.check_put(path, value)
+        device, path = self.at(path)
+        name, _, _ = checked_put(device.parts, path, value)
+        if name in device.parts:
             return
-        name, _, _ = checked_put(self.parts, path, value)
-        if name in self.parts:
-            return
-        if not isinstance(self.board, WiredBoard):
+        if not isinstance(device.board, WiredBoard):
             raise ValueError(f"{path}: no board file says what is wired to it; `mirotwin fw run` has --pins")
-        if path not in self.board.nets.netlist.free_pins():
+        if path not in device.board.nets.netlist.free_pins():
             raise ValueError(f"{path}: something is wired to it; put a value of that, or choose another pin")
 
     def put(self, path: str, value: PutValue, tick: int) -> None:
-        board, path = self.at(path)
-        if board is not self:
-            board.put(path, value, tick)
-            return
-        part, key, taken = checked_put(self.parts, path, value)
-        self.put_stopped = self._wired.put(part, key, taken, tick) or self.put_stopped
-        if self.changes is not None:
-            self.changes.look(tick)
+        device, path = self.at(path)
+        part, key, taken = checked_put(device.parts, path, value)
+        device.put_stopped = device._wired.put(part, key, taken, tick) or device.put_stopped
+        if device.changes is not None:
+            device.changes.look(tick)
 
     def value(self, path: str) -> float | int | bool | str:
-        board, path = self.at(path)
-        if board is not self:
-            return board.value(path)
-        part, key = self.reads.get(path) or checked_read(self.parts, path)
-        return self._wired.value(part, key)
+        device, path = self.at(path)
+        part, key = device.reads.get(path) or checked_read(device.parts, path)
+        return device._wired.value(part, key)
 
     def values(self) -> dict[str, float | int | bool | str]:
         return {path: self._wired.value(*part_and_key) for path, part_and_key in self.reads.items()}
@@ -121,11 +113,9 @@ class BoardAlone(Device):
 
     def find_pin(self, name: str) -> PinPlace:
         """Where the name of a pin leads. Raises ValueError."""
-        board, name = self.at(name)
-        if board is not self:
-            return board.find_pin(name)
-        netlist = self.board.nets.netlist if isinstance(self.board, WiredBoard) else Netlist()
-        return find_pin(self.board.spec, netlist, name)
+        device, name = self.at(name)
+        netlist = device.board.nets.netlist if isinstance(device.board, WiredBoard) else Netlist()
+        return find_pin(device.board.spec, netlist, name)
 
     def check_pin(self, name: str) -> None:
         self.find_pin(name)
