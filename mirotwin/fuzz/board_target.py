@@ -26,7 +26,7 @@ from miro_robot.image import SPACE_BYTES, Image
 from miro_robot.mcs51.chips import CHIPS
 from miro_sim.scenario.board_scenario import board_of_tables
 from miro_sim.world.events import PC, Event
-from mirotwin.fuzz.inputs import RESET, SILENCE, raw, waited
+from mirotwin.fuzz.inputs import PIN, PUT, RESET, SILENCE, raw, waited
 from mirotwin.fuzz.processor import BOOT_MS, bit_ticks_of, powered
 from mirotwin.fuzz.protocols import called, protocol_named, shown
 from mirotwin.fuzz.spec import TargetSpec
@@ -45,7 +45,7 @@ NO_FAULT_CODE, NEVER_SLEEPS_CODE, CHECK_CODE = 1, 2, 3
 MOST_OF_A_BODY = 32
 """Bytes of a body in a seed; the harness's program has a form for longer ones, which a fuzzer triage."""
 MOST_PUT_SEEDS = 64
-PUT, PIN, WAIT = b"\x01", b"\x04", bytes([SILENCE, 19])
+WAIT = bytes([SILENCE, 19])
 _BITS = (b"\0\0", b"\x01\0", b"\xff\x7f", b"\xfe\xff", b"\xff\xff")
 """Of a put in a seed: the ends and the middle of a number, and four words."""
 UNHEARD_BAUD = 9600

@@ -15,6 +15,7 @@ from miro_protocol.frames import encode
 from miro_protocol.hypothesis_frames import host_frames
 from miro_protocol.table import SERVICE_DATA, VELOCITY, VELOCITY_SATURATION, Opcode, downlink
 from miro_robot.harness.program import OPERATIONS
+from mirotwin.fuzz.inputs import PIN, PUT
 
 MOST_OPERATIONS = 16
 """Half a second on the air, more or less."""
@@ -22,7 +23,6 @@ _LIMITS = (0, 1, -1, *(limit for field in VELOCITY for limit in (field.low, fiel
 _SPEEDS = sorted({*_LIMITS, *(sign * VELOCITY_SATURATION + by for sign in (1, -1) for by in (-1, 0, 1))})
 _PAIRS = [struct.pack("<hh", left, right) for left in _SPEEDS for right in _SPEEDS]
 _BYTES = [bytes([value]) for value in range(256)]
-_PUT, _PIN = b"\x01", b"\x04"
 Bytes = st.SearchStrategy[bytes]
 
 
@@ -40,7 +40,7 @@ def inputs(
     with one of them. `puts`: a session may put values of parts and levels on pins.
     """
     if kind == "session" and puts:
-        put, pin = (st.binary(min_size=3, max_size=3).map(code.__add__) for code in (_PUT, _PIN))
+        put, pin = (st.binary(min_size=3, max_size=3).map(code.__add__) for code in (PUT, PIN))
         drawn = _joined(put | put | pin | _session_operations(robots, slot, True))
     else:
         drawn = {"bytes": _characters, "frames": _frames, "session": _session}[kind](robots, slot, foreign)
