@@ -31,9 +31,9 @@ from miro_protocol.table import (
 from miro_protocol.transmission import DOWN, Transmission
 
 SERVICE, FULL, FRAME, AGAIN, RAW, PAUSE, SILENCE, RESET = 5, 6, 7, 8, 9, 10, 11, 15
-PUT, PIN = b"\x01", b"\x04"
-"""Operations that put a value of a part, and a level on a pin."""
 """Operations of a session, by nibble."""
+PUT, PIN = b"\x01", b"\x04"
+"""Operations that put a value of a part, and a level on a pin, on a board with parts."""
 PAUSE_TICKS, SILENCE_TICKS = 2_400, 72_000
 _STEPS = 256
 _RAW_CHARACTERS = 32
