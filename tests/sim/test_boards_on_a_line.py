@@ -101,6 +101,10 @@ def test_a_setting_that_reaches_no_board_is_refused(folder, setting, said):
             "there is no board 'panle'",
         ),
         (("duration_s = 0.1", "duration_s = 0.1\nput = { panel.buss.broken = true }"), "no part 'buss'"),
+        (
+            ("duration_s = 0.1", 'duration_s = 0.1\nfirmware = "meter.ihx"'),
+            "board.meter.firmware: is that of the whole scenario, which names one, too; leave one of them out",
+        ),
         (('firmware = "meter.ihx"', 'firmware = "meter.ihx"\ncolour = 1'), "unknown key"),
         (
             ('file = "meter.board.toml"', 'fil = "meter.board.toml"'),
@@ -120,6 +124,19 @@ def test_what_is_wrong_is_one_line_with_its_place(folder, change, said):
         text_of(folder, TWO.replace(*change))
     assert said in str(found.value)
     assert str(found.value).count("\n") == 0
+
+
+def test_a_value_and_a_pin_of_no_board_are_refused(folder):
+    text = text_of(folder, TWO)
+    device = World(text.scenario, 0, image_for(text)).device()
+    device.check_put("meter.adc.ain0_v", 1.0)
+    device.check_pin("panel.P3.5")
+    with pytest.raises(ValueError, match=r"adc.ain0_v: there is no board 'adc'; write meter.adc.ain0_v"):
+        device.check_put("adc.ain0_v", 1.0)
+    with pytest.raises(ValueError, match=r"pannel.P3.5: there is no board 'pannel'; did you mean panel?"):
+        device.check_pin("pannel.P3.5")
+    with pytest.raises(ValueError, match=r"P3.5: there is no board 'P3'; write meter.P3.5"):
+        text.scenario.at("P3.5")
 
 
 def test_a_panel_without_its_wire_says_so(folder):

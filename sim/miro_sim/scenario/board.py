@@ -2,10 +2,12 @@
 
 from __future__ import annotations
 
+from collections.abc import Collection
 from typing import Any, ClassVar
 
 import msgspec
 
+from miro_exact.bad_input import did_you_mean
 from miro_exact.clock import NEVER_TICK
 from miro_protocol.actions import PutValue
 from miro_robot.board_spec import BoardSpec
@@ -31,6 +33,14 @@ class OtherBoard(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_onl
 
     board: BoardSpec
     image: str
+
+
+def check_board(path: str, boards: Collection[str], key: str = "") -> None:
+    """Of several boards: that one's name is in front. Raises ValueError, which begins with `key`."""
+    name = path.partition(".")[0]
+    if name not in boards:
+        remedy = did_you_mean(name, boards) or f"write {next(iter(boards))}.{path}"
+        raise ValueError(f"{key}{path}: there is no board {name!r}; {remedy}")
 
 
 class BoardScenario(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_only=True):
@@ -99,9 +109,12 @@ class BoardScenario(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_
         return {self.board_name: self.board, **{name: one.board for name, one in self.others.items()}}
 
     def at(self, path: str) -> tuple[BoardSpec, str]:
-        """The board of the name of a pin, and what the pin is called there."""
+        """The board of the name of a pin, and what the pin is called there. Raises ValueError for no board's."""
+        if not self.others:
+            return self.board, path
+        check_board(path, self.boards, "pin: ")
         name, _, rest = path.partition(".")
-        return (self.boards[name], rest) if self.others and name in self.boards else (self.board, path)
+        return self.boards[name], rest
 
     @property
     def clock(self) -> int:

@@ -187,7 +187,10 @@ def _on_line(origin: str, name: str, table: Table, scenario: Table) -> Table:
     if one.firmware:
         path = _beside(origin, f"{place}.{FIRMWARE}", one.firmware)
         if name == min(scenario[BOARD]):
-            scenario.setdefault(FIRMWARE, path)
+            if FIRMWARE in scenario:
+                what = "is that of the whole scenario, which names one, too"
+                raise ScenarioError(origin, f"{place}.{FIRMWARE}", what, "leave one of them out")
+            scenario[FIRMWARE] = path
         else:
             complete["image"] = load_hex(path).content.decode("latin-1")
     return {key: value for key, value in complete.items() if value != ""}

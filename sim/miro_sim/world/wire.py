@@ -19,7 +19,7 @@ from miro_robot.parts.values import checked_put, checked_read
 from miro_robot.parts.wire_part import WirePart
 from miro_robot.wired_board import WiredBoard
 from miro_sim.periods import PartValues
-from miro_sim.scenario.board import FASTEST_BIT_TICKS, BoardScenario
+from miro_sim.scenario.board import FASTEST_BIT_TICKS, BoardScenario, check_board
 from miro_sim.world.actions import SETTLE_TICKS
 from miro_sim.world.changes import Changes, PinPlace, find_pin
 from miro_sim.world.device import Device
@@ -80,6 +80,8 @@ class BoardAlone(Device):
         return board.changes, rest
 
     def check_put(self, path: str, value: PutValue) -> None:
+        if self.line:
+            check_board(path, self.line)
         device, path = self.at(path)
         name, _, _ = checked_put(device.parts, path, value)
         if name in device.parts:
@@ -118,6 +120,8 @@ class BoardAlone(Device):
         return find_pin(device.board.spec, netlist, name)
 
     def check_pin(self, name: str) -> None:
+        if self.line:
+            check_board(name, self.line, "pin: ")
         self.find_pin(name)
 
     def port_pin(self, name: str) -> tuple[int, int]:
