@@ -52,7 +52,8 @@ def _installed(text: str) -> tuple[type[Protocol], str, str]:
     try:
         return PROTOCOLS.find(name), name, parameters
     except PluginError as error:
-        raise BadInput("", OPTION, error.what, error.remedy) from error
+        own = ", or one of your own as FILE.py:CLASS" if error.what.endswith("one of the choices") else ""
+        raise BadInput("", OPTION, error.what, error.remedy + own) from error
 
 
 def _class_in_file(text: str) -> tuple[type[Protocol], str, str] | None:
