@@ -127,7 +127,7 @@ def test_a_scenario_that_stands_in_no_file_takes_settings_too():
         ("network.robot.1.slot=1", "or add it to the file that `mirotwin scenarios show NAME` prints"),
         ("network.robot={slot=1}", "reference: this key is missing; add it, as in `mirotwin scenarios show fig6`"),
         ("gain=0.3", "variant; `mirotwin scenarios show fig6` has those of their tables, too"),
-        ("network.robot=[]", "expected `array` of length >= 1"),
+        ("network.robot=[]", "expected a list of length >= 1"),
         ("duration_s=6s", "expected a number in seconds, got a string ('6s'); write the number without"),
         ("duration_s=nan", "nan is not a number that can be used; give a finite number"),
         ("duration_s=" + "9" * 5000, "expected a number in seconds, got a string"),

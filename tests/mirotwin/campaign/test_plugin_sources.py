@@ -70,7 +70,7 @@ def test_results_of_a_law_that_was_edited_are_those_of_another_campaign(site, tm
     assert campaign.run(plan_of(SHORT), path, Processes(1)).new == 8
     assert campaign.run(plan_of(SHORT), path, Processes(1)).new == 0
     before = path.read_bytes()
-    (site / "plug_scale.py").write_text("SCALE = 0.5\n")  # a module that the law imports
+    (site / "plug_scale.py").write_text("SCALE = 0.25\n")  # a module that the law imports
     with pytest.raises(
         BadInput, match=r"law edited of edited-law 1.0, sources \w+ instead of edited-law 1.0, sources"
     ):

@@ -147,6 +147,8 @@ async function main() {
   await client.pauseRequest(thread);
   assert.strictEqual((await end).body.reason, 'pause');
   await assert.rejects(client.customRequest('restartFrame', { frameId: 1 }));
+  await assert.rejects(client.setVariableRequest({ variablesReference: 1, name: 'x', value: '1' })); // a robot has no parts
+  used.add('SetVariable');
   const terminated = client.waitForEvent('terminated', 60000);
   await client.terminateRequest();
   used.add('TerminateRequest');
