@@ -146,10 +146,21 @@ def try_all(
     outcomes = in_order(rules, outcome_of)
     # before the process is copied: the first trial loads what every trial needs
     yield from islice(outcomes, 1)
+    _copied["tried"] = tried
     with spare_process() if ahead and len(rules) >= FEWEST else nullcontext() as pool:
         if pool is not None:
-            theirs |= {rule.id: pool.submit(tried, rule) for rule in presupposed_first(rules)[1::2]}
+            theirs |= {rule.id: pool.submit(_try_in_copy, rule) for rule in presupposed_first(rules)[1::2]}
         yield from outcomes
+
+
+_copied: dict[str, Callable[[Rule], Outcome]] = {}
+"""What the copied process tries rules with. A job that holds the image is more than a pipe takes: where the process is
+killed, the thread that writes the job would wait for ever (issue 94777 of CPython, before 3.12).
+"""
+
+
+def _try_in_copy(rule: Rule) -> Outcome:
+    return _copied["tried"](rule)
 
 
 def _try_and_explain(

@@ -1,6 +1,7 @@
 """The second process of `mirotwin conform`: the same outcomes in the same order, and nothing of it is left."""
 
 import os
+import pickle
 import signal
 import subprocess
 import sys
@@ -78,6 +79,11 @@ def test_what_a_killed_process_was_to_try_is_tried_by_the_first(trying, last):
     found = ahead(SOME)
     assert list(found) == [rule.id for rule in SOME]
     assert {found[rule.id] for rule in SOME[last:]} == {own}
+
+
+def test_jobs_are_so_small_that_a_pipe_takes_all_that_wait():
+    """Else whoever writes them waits for ever where the process was killed."""
+    assert max(len(pickle.dumps((run._try_in_copy, rule))) for rule in RULES) < 4096
 
 
 @pytest.mark.parametrize("place", [0, 1])
