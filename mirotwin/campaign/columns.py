@@ -56,7 +56,7 @@ _PARTS: tuple[_Part, ...] = (
 )
 """Prefix of the columns, where the figures stand in a summary, and their struct."""
 _BOARD_PARTS: tuple[_Part, ...] = (("", ("serial",), SerialFigures), ("", ("firmware",), FirmwareCounts))
-"""The same of the summary of a board."""
+"""As `_PARTS`, for the summary of a board."""
 
 
 def _kinds(struct: type) -> Iterator[tuple[str, type]]:
@@ -115,16 +115,16 @@ COLUMNS: Mapping[str, _Column] = {
 3 cm and 0.15 rad at the end. `worst_rms_position_cm`: the largest `rms_position_cm` of all robots."""
 FIGURES: Mapping[str, type] = {name: kind for name, (kind, _) in COLUMNS.items()}
 BOARD_COLUMNS: Mapping[str, _Column] = {**_SIMULATED, **_of_parts(_BOARD_PARTS)}
-"""The same of a run of a board."""
+"""Name -> type, and the value in one run of a board, as in `COLUMNS`."""
 BOARD_FIGURES: Mapping[str, type] = {name: kind for name, (kind, _) in BOARD_COLUMNS.items()}
 
 
 def figures_of(summary: AnySummary, tracks: Tracks, values: Mapping[str, type] = {}) -> dict[str, Any]:
     """The figures of one run, with those of the `values` of parts that it has. Raises ValueError for another kind."""
     run, columns = _Run(summary, tracks), COLUMNS if isinstance(summary, Summary) else BOARD_COLUMNS
-    found = {name: value(run) for name, (_, value) in columns.items()}
+    figures = {name: value(run) for name, (_, value) in columns.items()}
     parts = summary.parts if isinstance(summary, BoardSummary) else {}
-    return found | {path: as_kind(parts[path], kind) for path, kind in values.items() if path in parts}
+    return figures | {path: as_kind(parts[path], kind) for path, kind in values.items() if path in parts}
 
 
 STEP = re.compile(r"step_([0-9]+)_ms")

@@ -78,9 +78,9 @@ class Target(ABC):
     def seeds(self) -> list[bytes]:
         """Inputs to begin with."""
 
+    @abstractmethod
     def inputs_of(self, happened: Iterable[ScriptItem]) -> list[bytes]:
-        """What was sent and done, as inputs that do the same."""
-        raise NotImplementedError
+        """Inputs that send and do what `happened` lists."""
 
     def play(self, data: Any) -> int:
         """Puts the machine back and plays an input; how that ended, as of `Harness.play`."""
@@ -135,7 +135,7 @@ class Target(ABC):
         ]
 
     def put_at(self, tick: int, which: int, value: int) -> Put:
-        """A put of the program as an action."""
+        """A put of the program as an action; of a target whose programs have any."""
         raise NotImplementedError
 
     def note(self) -> str:
