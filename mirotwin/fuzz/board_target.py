@@ -298,7 +298,7 @@ class BoardTarget(Target):
         return f"inputs begin at {at(begin_tick, clock)}: {self.wired.how}; they put {puts or 'nothing'}"
 
     def chip_notes(self) -> list[str]:
-        """What the processor did while it came up that it cannot, or is reset by."""
+        """Registers that the chip lacks and resets by its watchdog while the firmware came up, a line each."""
         return [] if self.wired is None else self.wired.device.notes()
 
     def __repr__(self) -> str:

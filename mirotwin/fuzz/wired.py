@@ -117,7 +117,7 @@ class WiredMachine:
         self.to_pc.append((value, tick))
 
     def played(self) -> list[ScriptItem]:
-        """What all steps of the scenario send and do once the board is up, as far as they succeed."""
+        """Transmissions and actions of the scenario's steps after start-up, up to the first step that fails."""
         run = Run.traced(RunSpec(scenario=self.scenario, image=self.image, steps=self.steps))
         if run.player is None or run.trace is None:
             return []

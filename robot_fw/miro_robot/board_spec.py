@@ -57,7 +57,6 @@ class BoardSpec(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_only
     RAM of 64 KB. `start`: address of the first instruction, as after a jump there by a monitor. `bound_stack`: SP that
     leaves the stack of the image is a fault. `of_file`: a board file describes it: its port pins are
     nets, and a MOVX while P3.6 or P3.7 holds its strobe is a fault.
-
     `nets`: a name for the net of a port pin, or of several. `pull_ups`, `pull_downs`: nets, port pins, whole ports.
     `allow_contention`: the same, on which outputs of different level are no fault; the low one wins.
     `baud`: of what a terminal sends; 0: the receiver's own rate.

@@ -103,7 +103,7 @@ class EmptyBoard(ProcessorBoard):
         self.written = bytearray(_BYTES)  # with code_in_xram: 1 where the program has put code
         self.wrote = self.written
         self.touched = bytearray(_PAGE)
-        self.lacking = [0] * 256  # instructions that accessed registers that the chip has not, by address
+        self.lacking = [0] * 256  # instructions that accessed registers that the chip lacks, by address
         self.lacking_cycle = 0  # of the last that was counted
         self.load(image)
         chip = CHIPS[spec.chip]
@@ -345,7 +345,7 @@ class EmptyBoard(ProcessorBoard):
             self.lacking[address] += 1
 
     def lacking_registers(self) -> dict[int, int]:
-        """Instructions that accessed registers that the chip has not, by address."""
+        """Instructions that accessed registers that the chip lacks, by address."""
         return {address: self.lacking[address] for address in range(256) if self.lacking[address]}
 
     def receiver_on(self, tick: int) -> None:

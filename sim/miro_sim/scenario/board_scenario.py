@@ -289,7 +289,7 @@ def _line(tables: Table) -> tuple[str, BoardSpec, dict[str, OtherBoard]]:
             with ScenarioError.at("", BOARD):
                 spec = board_of_table(one.board, "", name)
             boards[name], images[name] = _strapped(spec, one.straps), one.image
-            if boards and not images[name] and name != min(tables):
+            if not images[name] and name != min(tables):
                 raise BadInput("", FIRMWARE, "no firmware is named", 'write firmware = "IMAGE.hex"')
     first = min(boards)
     for name, board in boards.items():

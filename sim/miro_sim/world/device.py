@@ -77,7 +77,7 @@ class Device:
         return stopped
 
     def notes(self) -> list[str]:
-        """What else the processor did that its user should know, a line each."""
+        """Notes for the user on what the processor did, a line each, such as resets by its watchdog."""
         return []
 
     # Parts of a board
