@@ -112,85 +112,12 @@
     document.dispatchEvent(new CustomEvent("moment", { detail: tick }));
   }
 
-  slider.addEventListener("input", () => { stop(); show(slider.valueAsNumber); });
-  document.addEventListener("click", (event) => {
-    const button = event.target.closest(".jump");
-    if (button) { stop(); show(indexAt(Number(button.dataset.tick))); }
-  });
-
-  let began = null;
-  const play = byId("play");
-  function stop() {
-    began = null;
-    play.setAttribute("aria-pressed", "false");
-    play.setAttribute("aria-label", "Play");
-  }
-  function frame(now) {
-    if (began === null) return;
-    const ticks = ((now - began.at) * Number(byId("speed").value) * data.ticks_per_s) / 1000;
-    const index = began.index + Math.floor(ticks / data.step);
-    if (index !== run.index) show(index);
-    if (index >= last) stop(); else requestAnimationFrame(frame);
-  }
-  function toggle() {
-    if (began !== null) { stop(); return; }
-    if (run.index >= last) show(0);
-    play.setAttribute("aria-pressed", "true");
-    play.setAttribute("aria-label", "Pause");
-    began = { index: run.index, at: performance.now() };
-    requestAnimationFrame(frame);
-  }
-  play.addEventListener("click", toggle);
-  byId("speed").addEventListener("change", () => { if (began) began = { index: run.index, at: performance.now() }; });
-
-  const begins = [...new Set(data.marks.map(([from]) => indexAt(from)))].sort((one, other) => one - other);
-  const next = () => begins.find((at) => at > run.index) ?? last;
-  const before = () => begins.findLast((at) => at < run.index) ?? 0;
-  const MOVES = {
-    ArrowRight: (far) => far ? next() : run.index + 1, ArrowUp: () => run.index + 1,
-    ArrowLeft: (far) => far ? before() : run.index - 1, ArrowDown: () => run.index - 1,
-    Home: () => 0, End: () => last,
-  };
-  document.addEventListener("keydown", (event) => {
-    if (event.ctrlKey || event.metaKey || event.altKey || event.target.closest("select, textarea")) return;
-    const vertical = event.key === "ArrowUp" || event.key === "ArrowDown";
-    if (event.key in MOVES && (event.target === slider || !vertical)) {
-      event.preventDefault();
-      stop();
-      show(MOVES[event.key](event.shiftKey));
-    } else if (event.key === " " && !event.target.closest("button, summary, a")) {
-      event.preventDefault();
-      toggle();
-    }
-  });
-
-  for (const tick of data.failures) {
-    const mark = document.createElement("i");
-    mark.style.left = `${(100 * Math.max(0, Math.min(last, indexAt(tick)))) / Math.max(1, last)}%`;
-    byId("marks").append(mark);
-  }
-
-  const begin = () => show(data.failures.length ? indexAt(data.failures[0]) : 0);
-  begin();
+  const jumps = [...new Set(data.marks.map(([from]) => indexAt(from)))].sort((one, other) => one - other);
   const narrow = matchMedia("(max-width: 700px)");
   const label = () => {
     for (const [name, plot] of Object.entries(window.plots.figures)) if (name.startsWith("plot-value")) plot.min_border_left = narrow.matches ? 60 : 136;
     for (const model of window.plots.models) if (model.tags.includes("wide")) model.visible = !narrow.matches;
   };
   narrow.addEventListener("change", label);
-  window.plots.ready.then(() => {
-    for (const [name, plot] of Object.entries(window.plots.figures)) {
-      byId(name).addEventListener("click", (event) => {
-        if (event.target.closest?.(".bk-Toolbar, button")) return;
-        const view = Bokeh.index.find_one?.(plot) ?? [...Bokeh.index].find((one) => one.model === plot);
-        const box = view?.canvas_view?.el.getBoundingClientRect();
-        if (!box) return;
-        stop();
-        show(indexAt(view.frame.x_scale.invert(event.clientX - box.left) * data.ticks_per_s));
-      });
-    }
-    label();
-    show(run.index);
-    document.body.dataset.ready = "true";
-  });
+  window.transport({ run, data, indexAt, step: data.step, jumps, drawn: label });
 })();

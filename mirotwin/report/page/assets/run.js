@@ -108,57 +108,6 @@
   }
 
   const indexAt = (tick) => Math.floor((tick - data.ticks[0]) / data.period_ticks);
-  slider.addEventListener("input", () => { stop(); show(slider.valueAsNumber); });
-  document.addEventListener("click", (event) => {
-    const button = event.target.closest(".jump");
-    if (button) { stop(); show(indexAt(Number(button.dataset.tick))); }
-  });
-
-  // Playing, at the speed of the robot times that of the list.
-  let began = null;
-  const play = byId("play");
-  function stop() {
-    began = null;
-    play.setAttribute("aria-pressed", "false");
-    play.setAttribute("aria-label", "Play");
-  }
-  function frame(now) {
-    if (began === null) return;
-    const speed = Number(byId("speed").value);
-    const index = began.index + Math.floor(((now - began.at) * speed * data.ticks_per_s) / 1000 / data.period_ticks);
-    if (index !== run.index) show(index);
-    if (index >= last) stop(); else requestAnimationFrame(frame);
-  }
-  function toggle() {
-    if (began !== null) { stop(); return; }
-    if (run.index >= last) show(0);
-    play.setAttribute("aria-pressed", "true");
-    play.setAttribute("aria-label", "Pause");
-    began = { index: run.index, at: performance.now() };
-    requestAnimationFrame(frame);
-  }
-  play.addEventListener("click", toggle);
-  byId("speed").addEventListener("change", () => { if (began) began = { index: run.index, at: performance.now() }; });
-
-  const MOVES = {
-    ArrowRight: () => run.index + 1, ArrowUp: () => run.index + 1,
-    ArrowLeft: () => run.index - 1, ArrowDown: () => run.index - 1,
-    Home: () => 0, End: () => last,
-  };
-  document.addEventListener("keydown", (event) => {
-    if (event.ctrlKey || event.metaKey || event.altKey || event.target.closest("select, textarea")) return;
-    const onSlider = event.target === slider;
-    const vertical = event.key === "ArrowUp" || event.key === "ArrowDown";
-    if (event.key in MOVES && (onSlider || !vertical)) {
-      event.preventDefault();
-      stop();
-      show(MOVES[event.key]());
-    } else if (event.key === " " && !event.target.closest("button, summary, a")) {
-      event.preventDefault();
-      toggle();
-    }
-  });
-
   // Which robot the plots show.
   byId("robot")?.addEventListener("change", (event) => {
     run.robot = Number(event.target.value);
@@ -169,27 +118,5 @@
     show(run.index);
   });
 
-  for (const tick of data.failures) {
-    const mark = document.createElement("i");
-    mark.style.left = `${(100 * Math.max(0, Math.min(last, indexAt(tick)))) / Math.max(1, last)}%`;
-    byId("marks").append(mark);
-  }
-
-  const begin = () => show(data.failures.length ? indexAt(data.failures[0]) : 0);
-  begin();
-  window.plots.ready.then(() => {
-    for (const [name, plot] of Object.entries(window.plots.figures)) {
-      byId(name).addEventListener("click", (event) => {
-        if (event.target.closest?.(".bk-Toolbar, button")) return;
-        const view = Bokeh.index.find_one?.(plot) ?? [...Bokeh.index].find((one) => one.model === plot);
-        const box = view?.canvas_view?.el.getBoundingClientRect();
-        if (!box) return;
-        const time = view.frame.x_scale.invert(event.clientX - box.left);
-        stop();
-        show(indexAt(time * data.ticks_per_s));
-      });
-    }
-    show(run.index);
-    document.body.dataset.ready = "true";
-  });
+  window.transport({ run, data, indexAt, step: data.period_ticks });
 })();
