@@ -107,14 +107,14 @@ class BoardWatch:
 
     def values(self, first_tick: int, end_tick: int) -> list[Changed]:
         """All values within these ticks; the first is that at their begin."""
-        found = []
+        changed = []
         for path, (ticks, values) in self._values.items():
             first = max(0, int(np.searchsorted(ticks, first_tick, side="right")) - 1)
             end = int(np.searchsorted(ticks, end_tick))
             kept = _thinned(values, first, end)
             since = [max(first_tick, ticks[at]) for at in kept]
-            found.append(Changed(path, since, [values[at] for at in kept], end - first - 1))
-        return found
+            changed.append(Changed(path, since, [values[at] for at in kept], end - first - 1))
+        return changed
 
     def changes(self, end_tick: int) -> list[tuple[int, str, str, Any]]:
         """All nets and values at the begin, and each change of one: tick, kind, name, what it is from then on."""

@@ -63,7 +63,7 @@ class KeilMap(msgspec.Struct, frozen=True, eq=False):
         return [(one.first, one.end) for one in self.segments if one.name.startswith(name)]
 
     def misses_start_up(self, code: bytes) -> str:
-        """What contradicts the image: the reset vector leads elsewhere than to the start-up code; else ""."""
+        """Why the map is not of this image: its reset leads elsewhere than to the start-up code. "" if it may be."""
         target, start_up = code[1] << 8 | code[2], self.extents("?C_C51STARTUP")
         if code[0] != _LJMP or not start_up or any(first <= target < end for first, end in start_up):
             return ""
@@ -109,7 +109,7 @@ def keil_map(image: Path) -> KeilMap | None:
 
 
 class _Reader:
-    """What has been read so far; `depth`: PROC, DO and BLOCK that are open, within which names are locals."""
+    """Holds what has been read so far. `depth`: how many PROC, DO and BLOCK are open; names within them are locals."""
 
     NOT_STATE = (  # a reader belongs to no world
         *("files", "segments", "codes", "publics", "statics", "lines", "begun"),
@@ -174,8 +174,8 @@ class _Reader:
     def finish(self) -> KeilMap:
         names = self.statics | self.publics
         code = sorted((symbol.address, name) for name, symbol in names.items() if symbol.space == "code")
-        found = [one for one in (self.function_in(*each, code) for each in self.codes) if one is not None]
-        for place, _ in found:
+        placed = [one for one in (self.function_in(*each, code) for each in self.codes) if one is not None]
+        for place, _ in placed:
             names.setdefault(place.name, Symbol(place.address, "code"))
         begun = {symbol.address for symbol in names.values() if symbol.space == "code"}
         for segment in self.segments:
@@ -185,7 +185,7 @@ class _Reader:
                 begin = segment.first + (segment.name == "_STACK")  # Raisonance's is what SP is set to
                 if begin <= 0xFF:  # what lies beyond is damage
                     names[STACK] = Symbol(begin, "iram")
-        in_c = {place.area.rpartition("?")[2].upper() for place, _ in found}
+        in_c = {place.area.rpartition("?")[2].upper() for place, _ in placed}
         lines = [
             (
                 address,
@@ -193,8 +193,8 @@ class _Reader:
             )
             for address, name, line in self.lines
         ]
-        places = sorted((place for place, _ in found), key=lambda place: place.address)
-        functions = tuple((place.name, place.address, end) for place, end in found)
+        places = sorted((place for place, _ in placed), key=lambda place: place.address)
+        functions = tuple((place.name, place.address, end) for place, end in placed)
         return KeilMap(MapFile(names, tuple(places), ()), tuple(self.segments), tuple(lines), functions)
 
     def function_in(

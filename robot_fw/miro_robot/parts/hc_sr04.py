@@ -8,7 +8,7 @@ echo  ______________________________|~~~~~~~~~~~~~~~~|__________
 
 On a car (`body = "car.body"`) it stands `ahead_cm`, `left_cm` of the car's middle, turned `turned_deg` to the left and
 as a servo is (`horn = "neck.horn"`). It measures to the nearest place of a wall in its beam of 15 degrees; one that it
-meets at more than 45 degrees to the upright sends nothing back. A distance that is put holds until `sees = "walls"` is.
+meets at more than 45 degrees from the perpendicular sends no echo. A put distance holds until `sees = "walls"` is put.
 """
 
 from __future__ import annotations
@@ -56,7 +56,7 @@ class HcSr04(PartKeys, frozen=True, kw_only=True, tag="hc_sr04"):
         "sees": Literal["put", "walls"],
     }
     READS = {
-        "distance_cm": "of the obstacle; 400 and more: there is no echo",
+        "distance_cm": "of the obstacle; above 400 there is no echo",
         "echo": "normal, none (no obstacle), or the level at which its output is stuck",
         "sees": "walls of the car's plane, or what was put",
         "pings": "measurements begun since power-on",

@@ -5,7 +5,7 @@ pwm  |~~|_________________|~~~|______    0.5 ms: 0 degrees .. 2.5 ms: 180 degree
      |<--- frame, 20 ms ->|
 
 What is on its horn (`horn = "neck.horn"`) turns with it, and looks ahead in the middle. `longer_turns`: to which side a
-longer pulse turns it, seen from above; an SG90 that stands upright goes to the left, though its sheet has it otherwise.
+longer pulse turns it, seen from above. Servos differ; left is chosen.
 """
 
 from __future__ import annotations

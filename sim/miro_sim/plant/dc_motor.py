@@ -128,7 +128,7 @@ class DcMotorPart(Part):
         self.changed(0, tick)
 
     def carry(self, kg_m2: float, friction_nm: float) -> None:
-        """What the shaft turns besides: the share of a car, from now on."""
+        """Adds a load to the shaft, from now on: the share of a car."""
         keys: Any = self.keys
         self.kg_m2 = keys.inertia_kg_m2 + kg_m2
         self.friction_nm = keys.friction_nm + friction_nm

@@ -116,7 +116,7 @@ class LineSensorsPart(OnCar):
             self.drive(number + 1, RELEASED if level == HIGH else LOW)
 
     def _look(self, tick: int) -> None:
-        """What all see, and the next look at which one of them may see something else."""
+        """Looks at the floor below all sensors, and plans the next look at which one of them may see another one."""
         car = self.car
         car.look(tick)
         looks = 1.0 * _LONGEST

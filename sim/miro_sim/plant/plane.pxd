@@ -18,5 +18,5 @@ cdef class Plane:
     cdef bint _is_dark(self, double x, double y) except -1
     @cython.locals(at=int, a_x=double, a_y=double, d_x=double, d_y=double, ahead=double, left=double, more=double, aside=double, middle=double, nearest=double, beyond=double)
     cpdef double echo_cm(self, double x, double y, double cosine, double sine) noexcept
-    @cython.locals(first=double, last=double, side=double, inside=double, change=double, length2=double, share=double, upright=double, distance=double)
+    @cython.locals(first=double, last=double, side=double, inside=double, change=double, length2=double, share=double, normal_cm=double, distance=double)
     cdef double _beam_cm(self, double ahead, double left, double more, double aside) noexcept

@@ -70,7 +70,7 @@ class Plane:
         return min(away, -_EDGE if self._is_dark(x, y) else _EDGE)
 
     def _is_dark(self, x: float, y: float) -> bool:
-        """Whether a cell of the picture is."""
+        """Whether the cell of the picture at a point is dark."""
         if x < 0.0 or y < 0.0 or x >= _FAR or y >= _FAR:
             return False
         row, column = int(y / self.cell_cm), int(x / self.cell_cm)
@@ -82,8 +82,8 @@ class Plane:
     def echo_cm(self, x: float, y: float, cosine: float, sine: float) -> float:
         """From a point to the nearest place of a wall in the beam that sends sound back; below 0: there is none.
 
-        The beam is a cone of 15 degrees. A place that it meets at more than 45 degrees to the upright sends nothing
-        back, and behind the wall that the middle of the beam meets nothing is heard.
+        The beam is a cone of 15 degrees. A place of a wall that it meets at more than 45 degrees from the perpendicular
+        sends no echo; neither does what is behind the wall that the middle of the beam meets.
         """
         nearest = beyond = _FAR
         for at in range(0, self.walls_end, 4):
@@ -104,7 +104,10 @@ class Plane:
         return nearest if nearest < _FAR and nearest <= beyond * _SAME else -1.0
 
     def _beam_cm(self, ahead: float, left: float, more: float, aside: float) -> float:
-        """The same for one wall, from (ahead, left) on by (more, aside), seen along the beam."""
+        """From the ranger to the nearest place of one wall that sends an echo, or `_FAR`.
+
+        The wall goes from (ahead, left) by (more, aside), in the axes of the beam.
+        """
         first, last = 0.0, 1.0
         for side in (-1.0, 1.0):  # cut off what is beyond each edge of the beam
             inside = _BEAM_TAN * ahead + side * left
@@ -119,11 +122,11 @@ class Plane:
             return _FAR
         length2 = more * more + aside * aside
         share = min(max(-(ahead * more + left * aside) / length2, first), last)
-        upright = abs(ahead * aside - left * more) / math.sqrt(length2)
+        normal_cm = abs(ahead * aside - left * more) / math.sqrt(length2)
         ahead += share * more
         left += share * aside
         distance = math.sqrt(ahead * ahead + left * left)
-        return distance if upright >= _GRAZING_COS * distance else _FAR
+        return distance if normal_cm >= _GRAZING_COS * distance else _FAR
 
     def __repr__(self) -> str:
         return f"Plane({self.walls_end // 4} walls, {self.lines_end // 4} pieces of lines)"

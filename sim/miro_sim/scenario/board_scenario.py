@@ -180,12 +180,13 @@ def _on_line(origin: str, name: str, table: Table, scenario: Table) -> Table:
     """One of several boards without other files; the image of the first is the scenario's."""
     place = f"{BOARD}.{name}"
     with ScenarioError.at(origin, place):
-        one = struct_of(table, _OnLine)
-    complete: Table = {BOARD: _board_table(origin, one.file) if one.file else one.board, "image": one.image}
-    if one.straps:
-        complete["straps"] = one.straps
-    if one.firmware:
-        path = _beside(origin, f"{place}.{FIRMWARE}", one.firmware)
+        keys = struct_of(table, _OnLine)
+    board = _board_table(origin, keys.file) if keys.file else keys.board
+    complete: Table = {BOARD: board, "image": keys.image}
+    if keys.straps:
+        complete["straps"] = keys.straps
+    if keys.firmware:
+        path = _beside(origin, f"{place}.{FIRMWARE}", keys.firmware)
         if name == min(scenario[BOARD]):
             if FIRMWARE in scenario:
                 what = "is that of the whole scenario, which names one, too"

@@ -74,12 +74,12 @@ class Bus(Wire):
         self.transceivers: list[Rs485Part | None] = []
         for slot, device in enumerate(self.devices):
             device.board.sent = partial(self._say, slot)
-            found = [part for part in device.board.parts if isinstance(part, WirePart)]
-            transceiver = found[0] if found and isinstance(found[0], Rs485Part) else None
+            wire_part = next((part for part in device.board.parts if isinstance(part, WirePart)), None)
+            transceiver = wire_part if isinstance(wire_part, Rs485Part) else None
             self.transceivers.append(transceiver)
             if transceiver is not None:
                 transceiver.join(self.names, slot, self.delay_ticks)
-            if device.board.drives_rxd or (found and transceiver is None):
+            if device.board.drives_rxd or (wire_part is not None and transceiver is None):
                 what = "a part drives P3.0 (RXD), or stands between it and the line"
                 raise BadInput("", f"board.{self.names[slot]}", what, "wire P3.0 to the line alone")
         if None in self.transceivers and (len(self.devices) > 2 or self.transceivers != [None, None]):

@@ -25,7 +25,7 @@ def plane(walls=(), lines=(), line_cm=2.0, picture=(), cell_cm=1.0):
 
 
 def beam(walls, x, y, heading):
-    """The slow twin: distances to many points of each wall, within 7.5 degrees; upright within 45."""
+    """The slow twin: distances to many points of each wall, within 7.5 degrees; 45 from the perpendicular at most."""
     best, middle, doubtful = math.inf, math.inf, False
     for x1, y1, x2, y2 in walls:
         nearest = None
