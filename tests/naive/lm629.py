@@ -24,7 +24,7 @@ class NaiveLm629:
         self.rst = 1
         self.rst_fell = 0
         self.threshold = 0x7FFF
-        self.lost = self.lost_starts = 0
+        self.lost = self.lost_starts = self.lost_wheels = 0
         self.port_byte = 0
         self.driven = 0
         self.alive_at = None
@@ -145,6 +145,7 @@ class NaiveLm629:
                     events.add(5)
                 if 9 in self.signals:
                     self.turn_off(events)
+                    self.lost_wheels += 1
             if not self.loop_open:
                 drive = self.pid.step(error)
         if self.loop_open:

@@ -143,7 +143,7 @@ class Pair:
             ),
             "data": (chip.data_out(tick), naive.data_out(tick)),
             "lost": (chip.writes_while_busy, naive.lost),
-            "lost starts": (self.log.end, naive.lost_starts + len(chip.commands)),
+            "notes": (self.log.end, naive.lost_starts + naive.lost_wheels + len(chip.commands)),
             "breakpoint": (chip.breakpoint, naive.breakpoint[0]) if naive.breakpoint else (0, 0),
             "position": (chip.real_position, naive.real),
             "velocity": (chip.real_velocity, naive.velocity_counts),
@@ -350,6 +350,16 @@ class Session(Bench):
     0,
     [("command", "SIP"), ("turn", 4), ("index", 0), ("turn", 2), ("command", "RESET")],
 )
+@example(
+    DEFAULT_OPTIONS,
+    0,
+    [
+        ("command", "LPES", 0),
+        ("go", ("load", 0x2A, 2048, 0, 0), 1),
+        ("turn", 1),
+        ("go", ("load", 0x2A, 2048, 0, 0), 1),
+    ],
+)  # the motor is switched off by its position error, which is noted
 def test_random_sessions_agree_with_the_slow_twin_bit_for_bit(options, start, actions):
     pair = Pair(options)
     session = Session(pair, start)
