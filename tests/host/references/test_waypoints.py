@@ -88,14 +88,16 @@ def test_velocities_are_the_derivatives_of_the_posture_and_accelerations_theirs(
     a, b = before.posture, after.posture
     theta_rad = here.posture.theta_rad
     way = (b.x_m - a.x_m) * math.cos(theta_rad) + (b.y_m - a.y_m) * math.sin(theta_rad)
-    assert way / (2 * h) == pytest.approx(here.v_m_s, abs=1e-7)
+    # Lengths are by three points of Gauss and Legendre: their error grows with the sixth power of what a cell bends.
+    sharp = max(1.0, (path.most_curvature_per_m / 40.0) ** 6)
+    assert way / (2 * h) == pytest.approx(here.v_m_s, abs=1e-7 * sharp)
     turn = math.remainder(b.theta_rad - a.theta_rad, 2.0 * math.pi)
-    assert turn / (2 * h) == pytest.approx(here.w_rad_s, abs=1e-6)
+    assert turn / (2 * h) == pytest.approx(here.w_rad_s, abs=1e-6 * sharp)
     assert (after.v_m_s - before.v_m_s) / (2 * h) == pytest.approx(here.v_dot_m_s2, abs=1e-7)
     steady = 1e-3 + 1e-3 * abs(here.w_dot_rad_s2)
     if abs(after.w_dot_rad_s2 - before.w_dot_rad_s2) <= steady:  # it jumps from piece to piece
         turned_faster = (after.w_rad_s - before.w_rad_s) / (2 * h)
-        assert turned_faster == pytest.approx(here.w_dot_rad_s2, rel=1e-4, abs=1e-5)
+        assert turned_faster == pytest.approx(here.w_dot_rad_s2, rel=1e-4, abs=1e-5 * sharp)
 
 
 @settings(max_examples=40)
