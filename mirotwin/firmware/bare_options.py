@@ -121,7 +121,7 @@ class BareOptions(Options, frozen=True, kw_only=True):
         Option(
             type=NAME,
             metavar="FILE",
-            help="Levels for port pins: lines TICK * P1.0 0|1 in order of time; # begins a comment.",
+            help="Levels for port pins: lines TICK * P1.0 0|1 in order of time, such as 4ms * P3.2 0.",
         ),
     ] = None
     go_on: Annotated[
@@ -202,7 +202,7 @@ def make_world(
     """
     board = msgspec.structs.replace(_board(options), start=_start(image, options))
     hz = board.crystal_hz
-    pieces, pins = _pieces(options, hz), _pins(options)
+    pieces, pins = _pieces(options, hz), _pins(options, hz)
     gap_ticks = 0 if options.stdin_gap is None else options.stdin_gap.ticks(hz)
     terminal = TerminalSpec(
         pieces=pieces,
@@ -395,7 +395,7 @@ def _stdin_bytes(path: str) -> bytes:
     return data
 
 
-def _pins(options: BareOptions) -> tuple[PinEvent, ...]:
+def _pins(options: BareOptions, hz: int) -> tuple[PinEvent, ...]:
     if options.pins is None:
         return ()
-    return read_pins(decode(read_input(options.pins)), options.pins)
+    return read_pins(decode(read_input(options.pins)), options.pins, hz)

@@ -3,42 +3,15 @@
 from __future__ import annotations
 
 import re
-from fractions import Fraction
-
-import msgspec
 
 from miro_exact.bad_input import BadInput, shortened
 from miro_exact.clock import TICKS_PER_SECOND
+from miro_exact.times import SHAPE, time_of
+from miro_exact.times import Time as Time
 from mirotwin.shell.command import Word
 
-UNITS_S = {
-    "h": Fraction(3600),
-    "min": Fraction(60),
-    "s": Fraction(1),
-    "ms": Fraction(1, 1000),
-    "us": Fraction(1, 1_000_000),
-}
-TICKS = "t"
-SHAPE = re.compile(r"([0-9]{1,18}(?:\.[0-9]{0,18})?|\.[0-9]{1,18}) *([a-z]*)", re.ASCII | re.IGNORECASE)
 LONGEST_S = 10**9
 """Longer than any run."""
-
-
-class Time(msgspec.Struct, frozen=True):
-    """Seconds, or ticks of the crystal; which crystal is known only when all options are."""
-
-    text: str
-    value: Fraction
-    in_ticks: bool
-
-    def __str__(self) -> str:
-        return self.text
-
-    def ticks(self, crystal_hz: int = TICKS_PER_SECOND) -> int:
-        return int(self.value if self.in_ticks else self.value * crystal_hz)
-
-    def seconds(self, crystal_hz: int = TICKS_PER_SECOND) -> float:
-        return float(self.value / crystal_hz if self.in_ticks else self.value)
 
 
 class TimeType(Word):
@@ -55,18 +28,14 @@ class TimeType(Word):
 
     def _read(self, word: str) -> Time:
         shown, text = shortened(repr(word)), word.strip()
-        match = SHAPE.fullmatch(text)
-        if match is None or not self._is_unit(match[1], match[2]):
-            raise ValueError(f"{shown} is not a time; {self._remedy(match)}.")
-        time = Time(text, Fraction(match[1]) * UNITS_S.get(match[2], 1), match[2] == TICKS)
+        time = time_of(text)
+        if time is None or (self.on_wall and time.in_ticks):
+            raise ValueError(f"{shown} is not a time; {self._remedy(SHAPE.fullmatch(text))}.")
         if self.positive and not time.value:
             raise ValueError(f"{shown} is no time at all; give more than zero.")
         if time.seconds() > self.longest_s:
             raise ValueError(f"{shown} is too long; the longest is {self.longest_s:.0f}s.")
         return time
-
-    def _is_unit(self, number: str, unit: str) -> bool:
-        return unit in UNITS_S or (unit == TICKS and not self.on_wall and "." not in number)
 
     def _remedy(self, match: re.Match[str] | None) -> str:
         if match is None or match[2]:

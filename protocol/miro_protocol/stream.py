@@ -5,7 +5,7 @@
     792000 > 55 55 55 55 55 ff 2d d4 fc ..  # team seq=3
     900000 *@0/1 reset 1
 
-TICK (24 MHz) of the first start bit, `>` host to robot or `<` robot to host, the characters in hexadecimal,
+TICK (24 MHz, or a time such as `4ms`) of the first start bit, `>` host to robot or `<` robot to host, the characters in hexadecimal,
 which follow each other without a pause, then a comment for people. Ticks do not go backwards from line to
 line; two lines may have the same one. What belongs here: whole files. What does not: the grammar of a line
 (`stream_line.py`) and of the header (`stream_header.py`), and judging the bytes; any bytes may be recorded.
@@ -90,10 +90,11 @@ class Reader:
             if self.version > 1 and line.text.startswith(PREFIX):
                 self._take_header(line)
                 continue
-            entry = line.parse(self.version)
+            if line.tokens:
+                self._close_header()
+            entry = line.parse(self.version, self.header.clock)
             if entry is None:
                 continue
-            self._close_header()
             if entry.what.tick < last:
                 remedy = f"put the lines in the order of their ticks; the line before has {last}"
                 raise line.error(line.tokens[0], f"tick {entry.what.tick} goes backwards", remedy)

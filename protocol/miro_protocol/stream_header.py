@@ -16,6 +16,7 @@ import msgspec
 from msgspec import Meta
 
 from miro_exact.bad_input import did_you_mean
+from miro_exact.clock import TICKS_PER_SECOND
 from miro_exact.domain import MAX_SEED
 from miro_protocol.stream_line import StreamError
 from miro_protocol.toml_text import TomlError, tables
@@ -50,6 +51,12 @@ class Header(msgspec.Struct, frozen=True, kw_only=True):
     def needed_version(self) -> int:
         """The first version of a stream file whose header may have these keys."""
         return 2 if self.board is None and self.crystal_hz is None else 3
+
+    @property
+    def clock(self) -> int:
+        """Ticks per second: of the crystal that the file names, or that a case for a bare processor names."""
+        named = self.crystal_hz or (self.bare or {}).get("crystal_hz")
+        return named if type(named) is int and named > 0 else TICKS_PER_SECOND
 
 
 KEYS = {field.name: field.type for field in msgspec.structs.fields(Header) if field.name != "text"}

@@ -7,6 +7,7 @@
     800000 *@1 radio down
     800000 * P1.0 0
     800000 * eyes.distance_cm = 60
+    40ms > 55 55 ff 2d d4          a time with its unit is read, too: ticks are what is written
 
 Version 1 has characters of network 0 with good stop bits, and nothing else; version 2 does not put values of parts.
 """
@@ -18,6 +19,8 @@ from dataclasses import dataclass, field
 from reprlib import repr as brief
 
 from miro_exact.bad_input import BadInput
+from miro_exact.clock import TICKS_PER_SECOND
+from miro_exact.times import tick_of
 from miro_protocol.actions import (
     PUT_PATH,
     Action,
@@ -50,7 +53,6 @@ RADIO_STATES = ("up", "down", "noise")
 
 _VERSION = re.compile(r"#\s*mirotwin stream\b\s*+(.*)")
 _TOKEN = re.compile(r"\S+")
-_TICK = re.compile(r"[0-9]{1,19}")
 _CHARACTER = re.compile(r"([0-9a-fA-F]{2})(!?)")
 _PLACE = re.compile(r"([<>*])(?:@([0-9]{1,5})(?:/([0-9]{1,5}))?)?")
 _PIN = re.compile(r"P[0-3]\.[0-7]")
@@ -160,11 +162,11 @@ class StreamLine:
             raise self.error(found.start(1) + 1, reason, remedy)
         return int(version)
 
-    def parse(self, version: int) -> Entry | None:
-        """What the line says, or None for a line that says nothing."""
+    def parse(self, version: int, crystal_hz: int = TICKS_PER_SECOND) -> Entry | None:
+        """What the line says, or None for a line that says nothing. `crystal_hz`: ticks a second."""
         if not self.tokens:
             return None
-        tick = self._tick(self.tokens[0])
+        tick = self._tick(self.tokens[0], crystal_hz)
         kind, network, slot = self._place(version)
         if kind == HAND:
             what: StreamItem = self._read_action(tick, network, slot, version)
@@ -172,11 +174,12 @@ class StreamLine:
             what = self._read_characters(tick, kind, network or 0, version)
         return Entry(what, self.comment, self.number)
 
-    def _tick(self, token: re.Match[str]) -> int:
-        if not _TICK.fullmatch(token[0]) or int(token[0]) > MAX_TICK:
-            remedy = f"a line starts with a whole number 0..{MAX_TICK}"
+    def _tick(self, token: re.Match[str], crystal_hz: int) -> int:
+        tick = tick_of(token[0], crystal_hz)
+        if tick is None or tick > MAX_TICK:
+            remedy = f"a line starts with a whole number 0..{MAX_TICK}, or with a time such as 4ms or 1.5s"
             raise self.error(token, f"{brief(token[0])} is not a tick", remedy)
-        return int(token[0])
+        return tick
 
     def _place(self, version: int) -> tuple[str, int | None, int | None]:
         """Direction or `*`, network, slot."""

@@ -122,12 +122,28 @@ def test_comments_may_stand_between_the_lines_of_a_header():
     assert (found.header.seed, found.header.scenario) == (3, "fig8")
 
 
+def test_a_tick_may_be_a_time_with_its_unit():
+    found = stream.parse("4ms > 55\n.5s > 56\n12000001t > 57\n12000001 < 58\n").entries
+    assert [entry.what.tick for entry in found] == [96_000, 12_000_000, 12_000_001, 12_000_001]
+    assert stream.format_stream(found).startswith("# mirotwin stream 1\n96000 > 55\n")
+
+
+@pytest.mark.parametrize("header", ["crystal_hz = 11059200", "[bare]\n#: crystal_hz = 11059200"])
+def test_a_time_counts_the_ticks_of_the_crystal_that_the_header_names(header):
+    found = stream.parse(f"# mirotwin stream 3\n#: {header}\n1.5ms > 55\n").entries
+    assert [entry.what.tick for entry in found] == [16_588], "rounded down"
+
+
 V2 = "# mirotwin stream 2\n"
 V3 = "# mirotwin stream 3\n"
 REFUSED = [
     ("x > 55", 1, 1, "'x' is not a tick", "0..2305843009213693951"),
     ("-1 > 55", 1, 1, "'-1' is not a tick", ""),
     ("9223372036854775808 > 55", 1, 1, "is not a tick", ""),
+    ("4m > 55", 1, 1, "'4m' is not a tick", "or with a time such as 4ms or 1.5s"),
+    ("4.5 > 55", 1, 1, "'4.5' is not a tick", ""),
+    ("1s > 55\n999ms > 55", 2, 1, "tick 23976000 goes backwards", "the line before has 24000000"),
+    ("999999999h > 55", 1, 1, "is not a tick", ""),
     ("5", 1, 2, "no direction", "write > for host to robot"),
     ("5 55", 1, 3, "'55' is not a direction", "write >"),
     ("5 >  # 55", 1, 4, "no characters", "two hex digits"),

@@ -4,7 +4,7 @@ Pins come from a text file:
 
     # TICK * PIN LEVEL, in the order of time; a tick is a period of the crystal, 12 a machine cycle
     0 * P3.2 1
-    24000 * P3.2 0     # /INT0 falls after 1 ms at 24 MHz
+    1ms * P3.2 0       # /INT0 falls after 1 ms: tick 24000 at 24 MHz
     24120 * P3.2 1
 
 Pins are high until the file says otherwise. P1 to P3 are quasi-bidirectional and P0 is open drain: a pin is low if its
@@ -20,11 +20,13 @@ from typing import NamedTuple
 import msgspec
 
 from miro_exact.bad_input import BadInput
+from miro_exact.clock import TICKS_PER_SECOND
+from miro_exact.times import tick_of
 
 RXD = (3, 0)  # P3.0, whose level also is what the receiver sees
 _LATEST_TICK = 1 << 60
-_LINE = re.compile(r"(\d{1,20})\s+\*\s+P([0-3])\.([0-7])\s+([01])", re.ASCII)
-_FORM = "write TICK * P1.0 0|1, such as 24000 * P3.2 0"
+_LINE = re.compile(r"([\d.]{1,40}[a-z]{0,3})\s+\*\s+P([0-3])\.([0-7])\s+([01])", re.ASCII)
+_FORM = "write TICK * P1.0 0|1, such as 24000 * P3.2 0 or 1ms * P3.2 0"
 
 
 class InputPiece(NamedTuple):
@@ -53,8 +55,8 @@ class PinEvent(NamedTuple):
     level: int
 
 
-def read_pins(text: str, path: str) -> tuple[PinEvent, ...]:
-    """The events of a file. Raises BadInput."""
+def read_pins(text: str, path: str, crystal_hz: int = TICKS_PER_SECOND) -> tuple[PinEvent, ...]:
+    """The events of a file. `crystal_hz`: ticks a second. Raises BadInput."""
     events: list[PinEvent] = []
     last: dict[tuple[int, int], int] = {}  # tick of the last event of a pin
     for number, line in enumerate(text.split("\n"), 1):
@@ -62,9 +64,10 @@ def read_pins(text: str, path: str) -> tuple[PinEvent, ...]:
         if not content:
             continue
         match = _LINE.fullmatch(content)
-        if match is None:
+        tick = None if match is None else tick_of(match[1], crystal_hz)
+        if match is None or tick is None:
             raise BadInput(path, number, f"{content[:40]!r} is no pin event", _FORM)
-        event = PinEvent(*(int(part) for part in match.groups()))
+        event = PinEvent(tick, *(int(part) for part in match.groups()[1:]))
         if event.tick > _LATEST_TICK:
             raise BadInput(path, number, f"tick {event.tick} is too late", f"use ticks up to {_LATEST_TICK}")
         if events and event.tick < events[-1].tick:

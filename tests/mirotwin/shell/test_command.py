@@ -15,7 +15,8 @@ from hypothesis import strategies as st
 
 from mirotwin.shell.command import Argument, Option, Options, command_line, command_of
 from mirotwin.shell.options import NAME, PATH, Whole
-from mirotwin.shell.times import UNITS_S, Time, TimeType, wall_time
+from miro_exact.times import UNITS_S
+from mirotwin.shell.times import Time, TimeType, wall_time
 from tests import children
 
 

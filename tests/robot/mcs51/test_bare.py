@@ -555,11 +555,18 @@ def test_a_file_has_comments_and_empty_lines():
     assert read_pins(text, "a.pins") == (PinEvent(0, 1, 0, 1), PinEvent(24, 3, 2, 0), PinEvent(24, 3, 3, 0))
 
 
+def test_a_level_on_a_pin_may_have_a_time_of_the_boards_crystal():
+    text = "0 * P1.0 1\n1ms * P3.2 0\n2.5ms * P3.2 1\n"
+    assert [event.tick for event in read_pins(text, "a.pins", 11_059_200)] == [0, 11_059, 27_648]
+
+
 @pytest.mark.parametrize(
     ("text", "said"),
     [
         ("0 * P1.0 1\n0 * P4.0 1\n", "a.pins:2: '0 * P4.0 1' is no pin event; write TICK * P1.0 0|1"),
         ("0 P1.0 1\n", "a.pins:1: "),
+        ("1.5 * P1.0 1\n", "a.pins:1: '1.5 * P1.0 1' is no pin event; write TICK * P1.0 0|1, such as"),
+        ("4sec * P1.0 1\n", "a.pins:1: "),
         ("0 * P1.8 1\n", "a.pins:1: "),
         ("-1 * P1.0 1\n", "a.pins:1: "),
         ("0 * P1.0 2\n", "a.pins:1: "),
@@ -575,7 +582,7 @@ def test_a_line_that_is_none_is_refused_with_its_place(text, said):
     assert str(error.value).startswith(said)
 
 
-@given(st.text(alphabet="0123456789 *P.#\n\r\t\x00é", max_size=60))
+@given(st.text(alphabet="0123456789ms *P.#\n\r\t\x00é", max_size=60))
 def test_any_text_is_read_or_refused(text):
     try:
         events = read_pins(text, "a.pins")
