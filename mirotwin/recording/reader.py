@@ -151,12 +151,12 @@ def _source(messages: Messages) -> RunSource:
         origin=metadata.get("source", ""),
         plugins=tuple(metadata.get("plugins", "").splitlines()),
         board=metadata.get("board", ""),
-        crystal_hz=_number(messages, metadata, "crystal_hz", TICKS_PER_SECOND),
-        bit_ticks=_number(messages, messages.serial, "bit_ticks", 0),
+        crystal_hz=number_of(messages, metadata, "crystal_hz", TICKS_PER_SECOND),
+        bit_ticks=number_of(messages, messages.serial, "bit_ticks", 0),
     )
 
 
-def _number(messages: Messages, table: Mapping[str, str], key: str, default: int) -> int:
+def number_of(messages: Messages, table: Mapping[str, str], key: str, default: int) -> int:
     text = table.get(key, f"{default}")
     if not re.fullmatch(r"[0-9]{1,10}", text):
         raise messages.error(f"{key} {text!r} is not a number", AGAIN)

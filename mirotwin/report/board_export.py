@@ -1,11 +1,10 @@
-"""A run of a board for other programs: as a stream file that plays it again, and as CSV of its nets and values."""
+"""A run of a board for other programs: as a stream file that plays it again, and its changes as rows."""
 
 from __future__ import annotations
 
-import csv
 from collections.abc import Callable, Iterator, Sequence
 from contextlib import suppress
-from io import BytesIO, StringIO
+from io import BytesIO
 from typing import Any
 
 from msgspec.structs import replace
@@ -19,6 +18,7 @@ from miro_sim.scenario.board_scenario import tables_of_board
 from mirotwin.recording.capture.recorded import transmissions_of
 from mirotwin.recording.container import RecordingError
 from mirotwin.recording.messages import Messages
+from mirotwin.report.tables import Named, timed
 from mirotwin.runs.board_case import is_for_board
 from mirotwin.runs.job import Job
 from mirotwin.runs.run import Run, replaying
@@ -64,7 +64,7 @@ def _script(job: Job) -> Sequence[ScriptItem]:
     )
 
 
-def board_csv(job: Job, progress: Callable[[int], object]) -> Iterator[bytes]:
+def board_rows(job: Job, progress: Callable[[int], object]) -> Iterator[Named]:
     """How all nets and values stood at first, and each change, in the order of time: of a run that is made for it."""
     from mirotwin.report.page.board_watch import BoardWatch  # a hot module: not before the engine was chosen
 
@@ -74,9 +74,5 @@ def board_csv(job: Job, progress: Callable[[int], object]) -> Iterator[bytes]:
     watch = BoardWatch(world)
     with replaying(spec.origin, world):
         Run(spec, world).play(progress)
-    rows = [("tick", "time_s", "kind", "name", "value")]
-    rows += [(tick, f"{tick / world.clock:.9f}", *more) for tick, *more in watch.changes(job.end_tick)]
-    for begin in range(0, len(rows), 1000):
-        text = StringIO(newline="")
-        csv.writer(text, lineterminator="\n").writerows(rows[begin : begin + 1000])
-        yield text.getvalue().encode()
+    for tick, *change in watch.changes(job.end_tick):
+        yield "changes", timed(tick, world.clock) | dict(zip(("kind", "name", "value"), change, strict=True))

@@ -21,8 +21,9 @@ from mirotwin.recording.capture.input import STDIN, Input
 from mirotwin.recording.capture.layout import look
 from mirotwin.recording.capture.source import READ_ERRORS, open_source
 from mirotwin.recording.decode_command import FORMAT
-from mirotwin.report.board_export import HEAD_BYTES, board_csv, board_stream, is_of_board
-from mirotwin.runs.job import load_job
+from mirotwin.report.board_export import HEAD_BYTES, board_rows, board_stream, is_of_board
+from mirotwin.report.tables import Named, Tables, recorded_rows, wire_row
+from mirotwin.runs.job import Job, load_job
 from mirotwin.shell.command import Argument, Option, Options, command_of
 from mirotwin.shell.console import show
 from mirotwin.shell.options import FIRMWARE, FORCE, NAME, NETWORK, OUT, QUIET, Engine
@@ -53,8 +54,20 @@ def export_foxglove(given: Input, format: str, out: str, quiet: bool) -> int:
     return DONE
 
 
-DEFAULTS = {".csv": "csv", ".stream": "stream", ".txt": "stream", ".mcap": "foxglove"}
+SUFFIXES = {".pcapng": "pcapng", ".stream": "stream", ".txt": "stream", ".mcap": "foxglove", ".csv": "csv"}
 TARGETS = ("pcapng", "stream", "foxglove", "csv")
+
+
+def target_of(out: str, target: str | None) -> str:
+    """The form to write: `target`, else that of the suffix, and pcapng where there is none. Raises BadInput."""
+    suffix = Path(out).suffix.lower()
+    if target or suffix in SUFFIXES:
+        return target or SUFFIXES[suffix]
+    if suffix:
+        waves = "; `mirotwin fw vcd` writes waveforms" if suffix == ".vcd" else ""
+        reason = f"files that end in {suffix} are not written"
+        raise BadInput("", f"--out {out}", reason, f"end it in {', '.join(SUFFIXES)}, or give --as{waves}")
+    return "pcapng"
 
 
 class Exported:
@@ -98,12 +111,17 @@ class ExportOptions(Options, frozen=True, kw_only=True):
         Option(
             "--as",
             type=click.Choice(TARGETS),
-            help="What to write. Default, by ending: .stream, .txt stream; .mcap foxglove; .csv csv; else pcapng.",
+            help="What to write. Default, by suffix: .pcapng, .stream, .txt (stream), .mcap (foxglove), .csv; without"
+            " one pcapng.",
         ),
     ] = None
     firmware: Annotated[str | None, FIRMWARE.saying("Stream of a board: its image, which runs for CSV.")] = (
         None
     )
+    channel: Annotated[
+        str | None,
+        Option(metavar="CHANNEL", help="CSV: only this table, such as net0/robot0/truth, into --out itself."),
+    ] = None
     format: Annotated[str | None, FORMAT.saying(FORMAT.help, type=click.Choice(TIMED))] = None
     network: Annotated[int | None, NETWORK.saying("Only this network. Default: all.")] = None
     parts: Parts = ()
@@ -136,30 +154,37 @@ def export(options: ExportOptions) -> int:
     \b
         mirotwin export run.mcap --out foxglove.mcap
 
-    The stream file of a board's run holds the board, what was put into its parts, and what it sent. As CSV it is run
-    again: how all nets and values of parts stood, and each change, with its tick.
+    As CSV, each channel of a recording is a table of its own, with units in the names of its columns: run.csv stands
+    for run-net0-robot0-truth.csv, run-net0-wire.csv and so on. A capture or a stream file is one table.
+
+    \b
+        mirotwin export run.mcap --out run.csv
+        mirotwin export run.mcap --out truth.csv --channel net0/robot0/truth
+
+    The stream file of a board's run holds the board, what was put into its parts, and what it sent. For CSV it is run
+    again: the table `changes` says how all nets and values of parts stood, and each change, with its tick.
     """
     out, network, quiet = options.out, options.network, options.quiet
-    if out != STDIN:
-        check_new(Path(out), "--out", options.force, options.file)
-    to = options.target or DEFAULTS.get(Path(out).suffix, "pcapng")
+    to = "csv" if options.channel and out == STDIN else target_of(out, options.target)
     if to == "foxglove" and network is not None:
         raise click.UsageError("--network does not go with --as foxglove, which writes all networks.")
+    if options.channel is not None and to != "csv":
+        raise click.UsageError("--channel goes with --as csv only.")
+    if out != STDIN and to != "csv":
+        check_new(Path(out), "--out", options.force, options.file)
     with Input(options.file) as given, ProgressBar("exporting", given.size, quiet) as bar:
         format = options.format or detect(given.peek())[0]
         if to == "foxglove":
             return export_foxglove(given, format, out, quiet)
-        if to != "pcapng" and options.file != STDIN and is_of_board(given.peek(HEAD_BYTES), format):
-            return export_board(options, to)
+        of_board = to != "pcapng" and is_of_board(given.peek(HEAD_BYTES), format)
         if to == "csv":
-            reason = f"CSV holds nets and values of a board, and no board is in it ({NAMES[format]})"
-            if options.file == STDIN:
-                reason = "CSV is made by running a board again, which takes a file"
-            raise BadInput(given.label, "--as csv", reason, "give a file (not -) of a run of a board")
+            if of_board and options.file == STDIN:
+                raise BadInput(given.label, "--as csv", "a board is run again for it", "give a file, not -")
+            return export_tables(options, given, format, bar, of_board)
+        if of_board and options.file != STDIN:
+            return export_board(options)
         if format not in TIMED:
-            raise BadInput(
-                given.label, "", f"{NAMES[format]} without times", "give a recording, stream or capture"
-            )
+            raise no_times(given, format)
         source = open_source(given, format, complain)
         layouts = look(source, None, complain) if to == "stream" else None
         exported = Exported(source.sent, network, given, bar)
@@ -178,23 +203,73 @@ def export(options: ExportOptions) -> int:
     return DONE
 
 
-def export_board(options: ExportOptions, to: str) -> int:
-    """Writes a run of a board; returns the exit code. Raises BadInput."""
+def export_tables(options: ExportOptions, given: Input, format: str, bar: ProgressBar, of_board: bool) -> int:
+    """Writes CSV, of what could be read; returns the exit code. Raises BadInput."""
+    recorded, only = format == "recording", options.channel
+    only = only and only.strip("/")
+    if options.out == STDIN and recorded and not only:
+        remedy = "give --channel, such as net0/robot0/truth"
+        raise BadInput(given.label, "--out -", "takes one table, and a recording is several", remedy)
+    if format not in TIMED:
+        raise no_times(given, format)
+    job = _board(options) if of_board else None
+    failure: Exception | None = None
+    with Tables(options.out, bool(only) or not recorded, only, options.force, options.file) as tables:
+        try:
+            for table, row in _rows(options, given, format, job):
+                tables.add(table, row)
+                bar.to(given.position)
+        except READ_ERRORS as error:
+            if not tables.rows:
+                raise
+            failure = error
+        if not tables.rows:
+            remedy = f"tables that have some: {', '.join(tables.passed_over) or 'none'}"
+            raise BadInput(given.label, f"--channel {only}" if only else "--as csv", "has no rows", remedy)
+    if not options.quiet and options.out != STDIN:
+        more = f" and {len(tables.paths) - 1} more" if len(tables.paths) > 1 else ""
+        show(f"{tables.paths[0]}{more}: {amount(tables.rows.total(), 'row')}")
+    if failure is not None:
+        complain(f"error: {failure}; everything before it was written")
+        return BAD_INPUT
+    return DONE
+
+
+def _rows(options: ExportOptions, given: Input, format: str, job: Job | None) -> Iterator[Named]:
+    """The rows of a file; of a board's run, `job`, also its changes, for which it is run again."""
+    if format == "recording":
+        yield from recorded_rows(given, options.network)
+    elif job is None:
+        sent = open_source(given, format, complain).sent
+        yield from (wire_row(one) for one in sent if options.network in (None, one.network))
+    if job is not None:
+        with ProgressBar("running it again", job.end_tick, options.quiet) as bar:
+            yield from board_rows(job, bar.to)
+
+
+def no_times(given: Input, format: str) -> BadInput:
+    reason = f"{NAMES[format]} without times"
+    return BadInput(given.label, "", reason, "give a recording, stream or capture")
+
+
+def _board(options: ExportOptions) -> Job:
     bring_parts(options.parts)
     job = load_job(options.file, options.firmware)
     complain(*job.notes)
-    with ProgressBar("running it again", job.end_tick, options.quiet or to != "csv") as bar:
-        pieces: Iterable[bytes]
-        if to == "csv":
-            if isinstance(job.spec.scenario, BoardScenario):
-                check_single(job.spec.scenario, options.file, "CSV")
-            pieces = board_csv(job, bar.to)
-        else:
-            pieces = [board_stream(job).encode()]
-        _write(options.out, pieces)
+    if isinstance(job.spec.scenario, BoardScenario):
+        check_single(job.spec.scenario, options.file, "CSV")
+    return job
+
+
+def export_board(options: ExportOptions) -> int:
+    """Writes a run of a board as a stream file; returns the exit code. Raises BadInput."""
+    bring_parts(options.parts)
+    job = load_job(options.file, options.firmware)
+    complain(*job.notes)
+    _write(options.out, [board_stream(job).encode()])
     if not options.quiet and options.out != STDIN:
-        line = f"; mirotwin replay {options.out} --firmware IMAGE plays it again" if to == "stream" else ""
-        show(f"{options.out}: {job.end_tick / job.spec.scenario.clock:.3f} s of a board{line}")
+        line = f"mirotwin replay {options.out} --firmware IMAGE plays it again"
+        show(f"{options.out}: {job.end_tick / job.spec.scenario.clock:.3f} s of a board; {line}")
     return DONE
 
 

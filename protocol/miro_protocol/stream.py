@@ -5,10 +5,11 @@
     792000 > 55 55 55 55 55 ff 2d d4 fc ..  # team seq=3
     900000 *@0/1 reset 1
 
-TICK (24 MHz, or a time such as `4ms`) of the first start bit, `>` host to robot or `<` robot to host, the characters in hexadecimal,
-which follow each other without a pause, then a comment for people. Ticks do not go backwards from line to
-line; two lines may have the same one. What belongs here: whole files. What does not: the grammar of a line
-(`stream_line.py`) and of the header (`stream_header.py`), and judging the bytes; any bytes may be recorded.
+TICK (24 MHz) of the first start bit, `>` host to robot or `<` robot to host, the characters in hexadecimal,
+which follow each other without a pause, then a comment for people. For the tick a time such as `4ms` may stand.
+Ticks do not go backwards from line to line; two lines may have the same one. What belongs here: whole files. What
+does not: the grammar of a line (`stream_line.py`) and of the header (`stream_header.py`), and judging the bytes; any
+bytes may be recorded.
 
 A file is written as version 1 if that has words for everything in it: no header, no action, one network and no bad stop
 bit; as version 3 if it puts values of parts, or is for a board. What is written is read back as the same.

@@ -35,7 +35,9 @@ NAMES = {
 
 _ENOUGH = 4
 _PACKED = {b"\x1f\x8b\x08": "gzip", b"PK\x03\x04": "zip", b"\xfd7zXZ\0": "xz", b"\x28\xb5\x2f\xfd": "zstd"}
-_STREAM = re.compile(rb"(?:\xef\xbb\xbf)?(?:#\s*mirotwin stream\b|(?:\s|#[^\n]*+\n)*+[0-9.]+[a-z]*[ \t]+[<>*])")
+_STREAM = re.compile(
+    rb"(?:\xef\xbb\xbf)?(?:#\s*mirotwin stream\b|(?:\s|#[^\n]*+\n)*+[0-9.]+[a-z]*[ \t]+[<>*])"
+)
 _TEXT = bytes(string.printable, "ascii")
 
 

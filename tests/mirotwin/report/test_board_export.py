@@ -9,6 +9,7 @@ from miro_protocol import stream
 from miro_protocol.pcapng_reader import iterate
 from mirotwin.recording import reader
 from mirotwin.runs.job import load_job
+from tests.mirotwin import program
 from tests.mirotwin.board_files import SCENARIO, board_folder
 from tests.mirotwin.report.page.test_board_page import STEPS
 
@@ -74,8 +75,13 @@ def test_a_capture_holds_the_characters_and_says_what_it_leaves_out(export):
 
 
 def test_csv_holds_each_edge_and_each_value_that_changed(export):
-    with open(export("run.csv", "-q")[0], newline="") as file:
-        rows = list(csv.DictReader(file))
+    file, _ = export("run.csv", "-q")
+    tables = {path.name for path in file.parent.iterdir()}
+    assert tables == {
+        f"run-{name}.csv" for name in ("changes", "net0-puts", "net0-values", "net0-wire", "period")
+    }
+    with open(file.with_name("run-changes.csv"), newline="") as changes:
+        rows = list(csv.DictReader(changes))
     ticks = [int(row["tick"]) for row in rows]
     assert ticks == sorted(ticks)
     lamp = [row["value"] for row in rows if (row["kind"], row["name"]) == ("net", "P2.0")]
@@ -91,8 +97,15 @@ def test_foxglove_gets_the_values_as_they_are_recorded(export):
     assert b"/net0/values" in file.read_bytes()
 
 
-def test_csv_of_robots_is_refused_in_one_line(tmp_path, mirotwin):
-    (tmp_path / "robots.stream").write_text("# mirotwin stream 1\n1000 > 55\n")
-    said = mirotwin.refuses("export", tmp_path / "robots.stream", "--out", tmp_path / "x.csv")
-    assert "--as csv: CSV holds nets and values of a board, and no board is in it (stream file)" in said
-    assert not (tmp_path / "x.csv").exists()
+def test_the_stream_of_a_board_has_one_table_its_changes(export, lamp):
+    first, _ = export("first.stream", "-q")
+    file, _ = export("again.csv", "-q", "--firmware", lamp / "lamp.hex", given=first)
+    recorded, _ = export("run.csv", "-q", "--channel", "changes")
+    assert file.read_text() == recorded.read_text()
+
+
+def test_a_board_from_a_pipe_is_refused_in_one_line(lamp, tmp_path):
+    with open(lamp / "run/run.mcap", "rb") as given:
+        done = program.run("export", "-", "--out", tmp_path / "x.csv", stdin=given)
+    said = "mirotwin: error: standard input: --as csv: a board is run again for it; give a file, not -\n"
+    assert (done.returncode, done.stderr) == (2, said)

@@ -13,9 +13,9 @@ from click.testing import CliRunner
 from hypothesis import given
 from hypothesis import strategies as st
 
+from miro_exact.times import UNITS_S
 from mirotwin.shell.command import Argument, Option, Options, command_line, command_of
 from mirotwin.shell.options import NAME, PATH, Whole
-from miro_exact.times import UNITS_S
 from mirotwin.shell.times import Time, TimeType, wall_time
 from tests import children
 
