@@ -83,7 +83,8 @@ SECTIONS = {
         "serve": Lazy("ports.serve_command", "Offers the robot's radio as PTY, TCP and RFC 2217 ports."),
         "campaign": campaign,
         "scenarios": Lazy("run.scenarios_command", "Lists the built-in scenarios, or shows one."),
-        "boards": Lazy("run.boards_command", "Lists boards and parts, or shows one of them."),
+        "boards": Lazy("run.boards_command", "Lists the built-in boards, or shows a board or a part."),
+        "plugins": Lazy("run.plugins_command", "Lists laws, parts, checks and others that are installed."),
     },
     "Test firmware": {
         "init": Lazy("testing.starter", "Begins a project: firmware, tests, scenarios, a workflow for CI."),

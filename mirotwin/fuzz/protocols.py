@@ -10,19 +10,13 @@ from typing import TypeVar
 import msgspec
 
 from miro_exact.bad_input import BadInput
-from miro_exact.plugins import PluginError, Registry
+from miro_exact.plugins import PluginError
 from miro_exact.raised import at_place, defined_at, described, raised, raised_at
-from miro_protocol.protocol import Damage, Frame, Protocol
+from miro_protocol.protocol import PROTOCOLS, Damage, Frame, Protocol
 from miro_protocol.toml_text import TomlError, struct_of
 
 T = TypeVar("T")
 OPTION = "--protocol"
-PROTOCOLS: Registry[Protocol] = Registry(
-    word="protocol",
-    key="protocol",
-    base="miro_protocol.protocol:Protocol",
-    own={"miro": "miro_protocol.miro_wire:Miro"},
-)
 
 
 def protocol_named(text: str) -> Protocol:

@@ -1,10 +1,8 @@
-"""`mirotwin boards`: the built-in boards, the parts that a board may have, and what each part is."""
+"""`mirotwin boards`: the built-in boards, and what each part of a board is."""
 
 from __future__ import annotations
 
-import re
 import sys
-from collections.abc import Iterator
 from inspect import cleandoc
 from typing import Annotated, Any
 
@@ -14,13 +12,12 @@ from msgspec import inspect
 
 from miro_exact import installed
 from miro_exact.bad_input import did_you_mean
-from miro_exact.plugins import PluginError
 from miro_robot.parts.keys import IN, OPEN_DRAIN, STRONG, TWO_WAY, PartKeys, Pin
 from miro_robot.parts.resolve import BoardError
 from miro_sim.scenario.base import is_path
 from miro_sim.scenario.board_file import board_text, builtin_boards, check_struct, load_board, table_of
-from miro_sim.scenario.errors import unit_name
 from miro_sim.scenario.parts import PARTS
+from mirotwin.run.plugins_command import Key, about, keys_of, takes
 from mirotwin.run.scenarios_command import ScenariosGroup
 from mirotwin.shell.command import Argument, DeclaredOption, Options, command_of
 from mirotwin.shell.console import plain_table
@@ -29,16 +26,7 @@ from mirotwin.shell.json_text import print_json
 from mirotwin.shell.options import JSON
 from mirotwin.shell.part_files import Parts, bring_parts
 
-_SENTENCE = re.compile(r"\.\s")
 KINDS = {IN: "input", STRONG: "output", OPEN_DRAIN: "open drain", TWO_WAY: "input and output"}
-
-
-class Key(msgspec.Struct):
-    """A key of a part in the board file, or of its values: what it takes, and without it."""
-
-    key: str
-    takes: str
-    default: str = ""
 
 
 class PartPage(msgspec.Struct):
@@ -63,46 +51,34 @@ class BoardsGroup(ScenariosGroup):
 
 
 @click.group(
-    cls=BoardsGroup, invoke_without_command=True, short_help="Lists boards and parts, or shows one of them."
+    cls=BoardsGroup,
+    invoke_without_command=True,
+    short_help="Lists the built-in boards, or shows a board or a part.",
 )
 @click.option(
     *(*JSON.names, "as_json"), cls=DeclaredOption, declared=JSON, heading="", is_flag=True, help=JSON.help
 )
 @click.pass_context
 def boards(context: click.Context, as_json: bool) -> None:
-    """Lists the built-in boards, and the parts that a board may have: our own and installed ones."""
+    """Lists the built-in boards."""
     if context.invoked_subcommand is not None:
         return
     listed = [_board_line(name) for name in builtin_boards()]
-    parts = [_part_line(name) for name in PARTS.names()]
     if as_json:
-        print_json({"boards": listed, "parts": parts})
+        print_json({"boards": listed})
         return
     table = plain_table("board", "chip", "crystal", "parts", bold=True)
     for board in listed:
         names = ", ".join(board["parts"])
         table.add_row(board["name"], board["chip"], f"{board['crystal_hz'] / 1e6:g} MHz", names)
-    print_result(table)
-    table = plain_table("part", "what it is", bold=True)
-    for part in parts:
-        table.add_row(part["name"], part["about"] + (f" ({part['origin']})" if part["origin"] else ""))
-    print_result(
-        "", table, "", "pins, keys and values of a part, or a board's file: mirotwin boards show NAME"
-    )
+    print_result(table, "", "a board's file, or the page of a part: mirotwin boards show NAME")
+    print_result("the parts: mirotwin plugins parts")
 
 
 def _board_line(name: str) -> dict[str, Any]:
     board = load_board(name)
     kinds = dict.fromkeys(part.keys.name for part in board.parts.values())
     return {"name": name, "chip": board.chip, "crystal_hz": board.crystal_hz, "parts": list(kinds)}
-
-
-def _part_line(name: str) -> dict[str, str]:
-    try:
-        page = page_of(name)
-    except PluginError as error:
-        return {"name": name, "origin": "cannot be used", "about": error.what}
-    return {"name": name, "origin": page.origin, "about": page.about}
 
 
 class ShowOptions(Options, frozen=True, kw_only=True):
@@ -129,7 +105,7 @@ def show(options: ShowOptions) -> None:
         return
     if name not in PARTS.names():
         known = [*builtin_boards(), *PARTS.names()]
-        remedy = did_you_mean(name, known, "`mirotwin boards` lists both")
+        remedy = did_you_mean(name, known, "`mirotwin boards` and `mirotwin plugins parts` list them")
         raise BoardError(name, "", "no such board and no such part", remedy)
     page = page_of(name)
     if options.as_json:
@@ -171,13 +147,13 @@ def page_of(name: str) -> PartPage:
     return PartPage(
         name=name,
         origin=installed.described(PARTS.word, name).partition(": ")[2].partition(", sources")[0],
-        about=_about(struct, text),
+        about=about(struct),
         text=text,
         pins=[
             {"name": pin.name, "kind": KINDS[pin.kind], "unconnected": _unconnected(pin)}
             for pin in struct.PINS
         ],
-        keys=list(_keys(struct)),
+        keys=list(keys_of(struct)),
         put=[Key(key, takes(inspect.type_info(kind), key)) for key, kind in struct.PUTS.items()],
         read={key: str(meaning) for key, meaning in struct.READS.items()},
         sheet=str(struct.SHEET),
@@ -196,50 +172,3 @@ def _text(struct: type[PartKeys]) -> str:
     module = sys.modules.get(struct.__module__)
     head = module.__doc__ if module is not None else getattr(struct.make, "__globals__", {}).get("__doc__")
     return cleandoc(head or struct.__doc__ or "a part").rstrip()
-
-
-def _about(struct: type[PartKeys], text: str) -> str:
-    """In one line; a part that another one of its file is based on says itself what it is."""
-    doc = struct.__doc__ if struct.__base__ is not PartKeys else None
-    return f"{_SENTENCE.split(doc)[0].rstrip('.')}." if doc else text.partition("\n")[0]
-
-
-def _keys(struct: type[msgspec.Struct], above: str = "", whole: Any = None) -> Iterator[Key]:
-    """The keys of a table, those of tables in it by their paths. `whole`: the table that is the default."""
-    for field in inspect.type_info(struct).fields:  # type: ignore[attr-defined]
-        key = f"{above}{field.encode_name}"
-        default = field.default if whole is None else getattr(whole, field.name)
-        if isinstance(field.type, inspect.StructType):
-            yield from _keys(field.type.cls, f"{key}.", None if default is msgspec.NODEFAULT else default)
-            continue
-        if default is msgspec.NODEFAULT and field.default_factory is not msgspec.NODEFAULT:
-            default = field.default_factory()
-        shown = "" if default in (msgspec.NODEFAULT, None) else msgspec.json.encode(default).decode()
-        yield Key(key, takes(field.type, key), shown)
-
-
-def takes(kind: inspect.Type, key: str = "") -> str:
-    """What a key takes, in words of the file: `a number in milliseconds, 0 to 100`."""
-    if isinstance(kind, inspect.Metadata):
-        return takes(kind.type, key)
-    if isinstance(kind, inspect.LiteralType):
-        return " or ".join(msgspec.json.encode(value).decode() for value in kind.values)
-    if isinstance(kind, inspect.UnionType):
-        return " or ".join(dict.fromkeys(takes(one, key) for one in kind.types))
-    if isinstance(kind, inspect.IntType | inspect.FloatType):
-        what = "a whole number" if isinstance(kind, inspect.IntType) else "a number"
-        unit = unit_name(key)
-        return f"{what}{' in ' * bool(unit)}{unit}{_range(kind)}"
-    words = {inspect.BoolType: "true or false", inspect.StrType: "a string", inspect.NoneType: "nothing"}
-    return words.get(type(kind), "a list" if "Tuple" in type(kind).__name__ else "a table")
-
-
-def _range(kind: inspect.IntType | inspect.FloatType) -> str:
-    least = kind.gt if kind.ge is None else kind.ge
-    most = kind.lt if kind.le is None else kind.le
-    above, below = "above " * (kind.gt is not None), "below " * (kind.lt is not None)
-    if least is not None and most is not None:
-        return f", {above}{least:.12g} to {below}{most:.12g}"
-    if least is not None:
-        return f", {above or 'at least '}{least:.12g}"
-    return f", {below or 'at most '}{most:.12g}" if most is not None else ""

@@ -6,7 +6,6 @@ from typing import Annotated, Any
 import click
 
 from miro_exact.bad_input import shortened
-from miro_exact.plugins import PluginError
 from miro_sim.scenario import file as scenario_file
 from miro_sim.scenario import profiles as scenario_profiles
 from miro_sim.scenario.board_scenario import load_any
@@ -15,7 +14,6 @@ from mirotwin.shell.console import plain_table
 from mirotwin.shell.console import show as print_result
 from mirotwin.shell.options import SET, ScenarioName
 from mirotwin.shell.program import LazyGroup
-from mirotwin.verify.checks.expect import CHECKS, struct_of
 
 
 class ScenariosGroup(LazyGroup):
@@ -105,22 +103,6 @@ def variants() -> None:
     for name, variant in scenario_profiles.tables_of("variant").items():
         keys = _keys({key: value for key, value in variant.items() if key != "about"})
         table.add_row(name, variant["about"], keys)
-    print_result(table)
-
-
-@scenarios.command()
-def checks() -> None:
-    """Lists the checks, for --expect and [expect], and their parameters; a bare value is that of the one with a *."""
-    table = plain_table("check", "what it checks", "parameters", bold=True)
-    for name in CHECKS.names():
-        try:
-            struct = struct_of(name)
-        except PluginError as error:
-            table.add_row(name, error.what, "")
-            continue
-        keys = [f"{key}*" if key == struct.MAIN else key for key in struct.__struct_encode_fields__]
-        about = " ".join((struct.__doc__ or "").partition("\n\n")[0].split())
-        table.add_row(name, about, ", ".join(keys))
     print_result(table)
 
 

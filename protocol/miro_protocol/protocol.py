@@ -9,6 +9,8 @@ from __future__ import annotations
 
 import msgspec
 
+from miro_exact.plugins import Registry
+
 
 class Frame(msgspec.Struct, frozen=True):
     """A good frame: its body, and `start` .. `end` - 1, where its characters stand among those decoded."""
@@ -59,3 +61,11 @@ class Protocol(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_only=
     def samples(self) -> tuple[bytes, ...]:
         """Bodies that mean something, one of each kind: what fuzzing begins with."""
         return (b"",)
+
+
+PROTOCOLS: Registry[Protocol] = Registry(
+    word="protocol",
+    key="protocol",
+    base="miro_protocol.protocol:Protocol",
+    own={"miro": "miro_protocol.miro_wire:Miro"},
+)

@@ -15,8 +15,8 @@ from miro_host.laws.yang_kim import Gains
 from miro_host.references.arc import Arc, ArcRef, LineRef, StraightLine
 from miro_host.references.interface import CheckedReference
 from miro_host.registries import ESTIMATORS, LAWS, REFERENCES
+from miro_protocol.protocol import PROTOCOLS
 from miro_sim.scenario.file import parse
-from mirotwin.fuzz.protocols import PROTOCOLS
 from mirotwin.verify.checks.expect import CHECKS
 from tests import children
 from tests.exact.distribution import install

@@ -22,7 +22,9 @@ DelayS = Annotated[float, Meta(ge=0.0, le=0.25)]
 
 
 class PredictParameters(EstimatorParameters, frozen=True, kw_only=True, tag="predict"):
-    """`age_s`: from exposure to arrival, one camera frame by default. `ahead_s`: from arrival to the command's effect.
+    """A measurement moved on by the commands since its exposure, to the time of the next command.
+
+    `age_s`: from exposure to arrival, one camera frame by default. `ahead_s`: from arrival to the command's effect.
 
     The default of `ahead_s` is that of a network of three robots: 3 ms of computing, 1 ms of key-up, 24 ms on the air,
     and half of the LM629's ramp.

@@ -44,7 +44,7 @@ CHECKS: Registry[object] = Registry(
 EXAMPLE_VALUES = {"condition": '{ event = "fault" }', "until_tick": "24000000"}
 """The text of a message for a parameter without a default."""
 WHERE_CHECKS_ARE = (
-    "`mirotwin scenarios checks` lists them, --expect FILE.py:CLASS takes one of your own,"
+    "`mirotwin plugins checks` lists them, --expect FILE.py:CLASS takes one of your own,"
     " `mirotwin examples checks` writes one to pip install"
 )
 

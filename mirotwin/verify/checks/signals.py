@@ -147,7 +147,7 @@ class ValueAtMost(Check, frozen=True, kw_only=True, tag="value_at_most"):
 
 
 class ValueAtLeast(ValueAtMost, frozen=True, kw_only=True, tag="value_at_least"):
-    """Values of parts never fall below these; the same."""
+    """Values of parts never fall below these, as looked at each 1 / 1000 s and after each put."""
 
     WORD: ClassVar[str] = "at least"
 

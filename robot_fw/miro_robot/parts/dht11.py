@@ -32,7 +32,7 @@ _MISSING, _SUM = 1, 2
 
 
 class Dht11(PartKeys, frozen=True, kw_only=True, tag="dht11"):
-    """Whole degrees and percent."""
+    """A DHT11: humidity and temperature over one wire, in whole percent and degrees."""
 
     PINS = (Pin("data", OPEN_DRAIN),)
     PUTS: ClassVar[dict[str, Any]] = {

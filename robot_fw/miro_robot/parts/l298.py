@@ -34,7 +34,7 @@ class Forward(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_only=T
 
 
 class L298(PartKeys, frozen=True, kw_only=True, tag="l298"):
-    """A bridge. `forward`: the inputs that drive forward when they are high.
+    """An L298: two H-bridges, each with an enable. `forward`: the inputs that drive forward when they are high.
 
     `duty`: of the last PWM period, which begins when it begins to drive, and ends when it begins again to drive the
     same way: time driven forward less time driven backward, over the period. The PWM may be on the enable or on inputs.

@@ -53,9 +53,10 @@ _ROM = (
 
 
 class Lcd1602(PartKeys, frozen=True, kw_only=True, tag="lcd1602"):
-    """A character display. `rows`, `columns`; `clock_khz`: its oscillator, 190 to 350 with the usual 91 kohm.
+    """A character display with an HD44780U. `rows`, `columns`; `clock_khz`: its oscillator.
 
-    `reset_ms`: it is busy after power-on (10 ms after 4.5 V; how fast the supply rises is up to the board).
+    `clock_khz` is 190 to 350 with the usual 91 kohm. `reset_ms`: it is busy after power-on (10 ms after 4.5 V; how
+    fast the supply rises is up to the board).
     Raises ValueError for more than 80 characters.
     """
 

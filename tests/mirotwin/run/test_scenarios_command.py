@@ -8,7 +8,6 @@ from click.testing import CliRunner
 
 from miro_sim.scenario.file import builtin_text, parse
 from mirotwin.shell.program import MainGroup
-from mirotwin.verify.checks.expect import CHECKS
 
 REPORT = "please report this line with the command (MIROTWIN_TRACEBACK=1 shows the place)"
 
@@ -24,13 +23,6 @@ def test_the_built_in_scenarios_are_listed_with_what_they_show(mirotwin):
 def test_show_prints_the_file_as_it_stands(mirotwin, name):
     assert mirotwin("scenarios", "show", name) == (0, builtin_text(name), "")
     assert tomllib.loads(mirotwin("scenarios", "show", name)[1])["name"] == name
-
-
-def test_the_checks_are_listed_with_their_parameters(mirotwin):
-    out = mirotwin.succeeds("scenarios", "checks")
-    rows = {line.split()[0]: line for line in out.splitlines() if line.strip()}
-    assert set(CHECKS.own) <= set(rows)
-    assert rows["tracks_within_cm"].endswith("limit_cm*, from_s")
 
 
 @pytest.mark.parametrize("command", [["scenarios", "show"], ["run"]])

@@ -59,7 +59,7 @@ def test_a_robot_may_expect_otherwise_than_all():
 
 
 def test_who_asks_for_a_check_that_is_none_is_told_how_one_is_made():
-    both = "; `mirotwin scenarios checks` lists them, .* `mirotwin examples checks` writes one"
+    both = "; `mirotwin plugins checks` lists them, .* `mirotwin examples checks` writes one"
     with pytest.raises(ScenarioError, match=both):
         names("[expect]\nfast = 1\n")
 
@@ -196,7 +196,7 @@ def test_a_check_without_an_occasion_is_named(mirotwin, short, tmp_path):
 def test_an_unknown_check_is_refused_before_anything_runs(command, mirotwin, short, finished, tmp_path):
     given = (short, "--out", tmp_path / "run") if command == "run" else (finished / "run.mcap",)
     err = mirotwin.refuses(command, *given, "--expect", "inside_pich=true")
-    said = "there is no such check; did you mean inside_pitch? `mirotwin scenarios checks` "
+    said = "there is no such check; did you mean inside_pitch? `mirotwin plugins checks` "
     assert f"--expect inside_pich=true: {said}" in err
     assert not (tmp_path / "run").exists()
 
