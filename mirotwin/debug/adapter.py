@@ -26,11 +26,14 @@ from miro_robot.image.c_types import CType
 from miro_robot.inspect.writes import Bytes
 from miro_robot.mcs51.opcodes import SFRS
 from mirotwin.debug.board_values import GROUPS, value_on
-from mirotwin.debug.console import VERBS, Console, shown_value
 from mirotwin.debug.debugger import STEPPED, Breakpoint, Debugger
 from mirotwin.debug.expression import Term, Value, children, content, expression
+from mirotwin.debug.looking import REGISTERS
+from mirotwin.debug.session import Session
+from mirotwin.debug.shown import quoted, shown_value, text_in
 from mirotwin.debug.subject import launched, open_subject
 from mirotwin.debug.symbols import SIZES, Moment
+from mirotwin.debug.verbs import completions, do, is_command
 from mirotwin.debug.wire import Message, Wire
 
 CAPABILITIES = (
@@ -57,7 +60,6 @@ _MOST_LOG, _MOST_TERMS = 4096, 32  # characters and expressions of a message
 _IN_BRACES = re.compile(r"\{([^{}]*)\}")
 _PLACE = re.compile(r"(iram|sfr|xram):([0-9]{1,5}):([0-9]{1,5})(?::([0-9]{1,20}))?")
 _PATH = re.compile(r"(?:(\w+):)?([A-Za-z_]\w*)((?:\.\w+|\[[0-9]{1,6}\])*)")
-_REGISTERS = (*(f"R{at}" for at in range(8)), "A", "B", "DPTR", "SP", "PSW", "PC", "tick", "cycle")
 _REASONS = {
     "breakpoint": "breakpoint", "begin": "entry", "case": "exception", "firmware": "exception", "goto": "goto",
     "step": "step",
@@ -74,7 +76,7 @@ class Adapter:
         self.wire = wire
         self.token = token
         self.its: Debugger
-        self.console: Console
+        self.session: Session
         self.began = False
         self.children: list[tuple[dict[str, Shown], str]] = []
         self.paused = self.ended = False
@@ -164,7 +166,7 @@ class Adapter:
         self.symbols = debugger.symbols
         self.timeline = debugger.timeline
         self.timeline.interrupted = self._interrupted
-        self.console = Console(debugger)
+        self.session = Session(debugger)
         self.began = True
 
     def on_configurationDone(self, given: Message) -> None:
@@ -304,7 +306,7 @@ class Adapter:
             self._event("output", category="stderr", output=f"{error}\n")
             why = "step"
         for cycle, core, text, address in self.its.told:
-            begin = self.console.time(cycle * CYCLE_TICKS, core)
+            begin = self.session.time(cycle * CYCLE_TICKS, core)
             self._event(
                 "output", category="console", output=f"{begin}{text}\n", **self._place(address, "source")
             )
@@ -397,7 +399,7 @@ class Adapter:
             file = AnyPath(line.file).stem
             yield f"Statics of {file}.c", None, moment.variables(file).items()
         yield "Globals", "globals", moment.variables("").items()
-        for title, names in (("Registers", _REGISTERS), ("Special function registers", SFRS)):
+        for title, names in (("Registers", REGISTERS), ("Special function registers", SFRS)):
             yield title, "registers", [(name, partial(moment.find, name, "")) for name in names]
         if moment.core.board is not None:
             for side, chip in children(moment.find("lm629", "")):
@@ -417,7 +419,7 @@ class Adapter:
         """The last frames on the air of this robot's network, the latest first."""
         for event in self.timeline.radio_events()[:-9:-1]:
             text = str(event).partition(": ")[2]
-            yield self.console.time(event.tick, 0).split()[0], partial(Value, number=text)
+            yield self.session.time(event.tick, 0).split()[0], partial(Value, number=text)
 
     def on_variables(self, given: Message) -> Message:
         reference = given["variablesReference"]
@@ -451,6 +453,8 @@ class Adapter:
             return {key: str(error), "variablesReference": 0}
         inner = children(value)
         text = shown_value(whole) if not inner or isinstance(whole, int) else str(value.kind or "")
+        if inside := text_in(value):
+            text += f" {quoted(inside)}"
         place = None
         if isinstance(value.moment, Moment) and value.space in SIZES:
             thread = self.timeline.cores.index(value.moment.core)
@@ -464,26 +468,31 @@ class Adapter:
 
     def on_evaluate(self, given: Message) -> Message:
         text = given["expression"].strip()
-        if given.get("context") != "repl" or text.removeprefix("r ").partition(" ")[0] not in VERBS:
+        if given.get("context") != "repl" or not is_command(text, self.symbols.known):
             value = expression(text)(self._moment(given.get("frameId")))
             return self._shown(lambda: value, text, "result")
-        there, self.paused, self.console.why = self.its.breakpoints[:], False, ""
-        self.console.do(text)
+        there, self.paused = self.its.breakpoints[:], False
+        do(self.session, text)
         for breakpoint in there:
             if breakpoint.kind and breakpoint not in self.its.breakpoints:
                 self._event(
                     "breakpoint", reason="removed", breakpoint={"id": breakpoint.number, "verified": False}
                 )
-        if self.console.why:
-            self.run_after = partial(self._stopped, self.console.why)
-        if self.console.ended:
+        if self.session.why:
+            self.run_after = partial(self._stopped, self.session.why)
+        if self.session.ended:
             self.on_terminate(given)
-        return {"result": "\n".join(self.console.lines), "variablesReference": 0}
+        return {"result": "\n".join(self.session.lines), "variablesReference": 0}
 
     def on_completions(self, given: Message) -> Message:
-        begun = re.split(r"\W", given["text"][: given["column"] - 1])[-1]
-        words = sorted({*VERBS, *self.symbols.known})
-        return {"targets": [{"label": word} for word in words if word.startswith(begun)]}
+        text = given["text"][: given["column"] - 1]
+        first, words = completions(self.session, text)
+        where = (
+            {}
+            if text[first:].isidentifier() or first == len(text)
+            else {"start": first + 1, "length": len(text) - first}
+        )
+        return {"targets": [{"label": word, **where} for word in words]}
 
     def on_readMemory(self, given: Message) -> Message:
         thread, space, place = ["0", "code", *given["memoryReference"].split(":")][-3:]

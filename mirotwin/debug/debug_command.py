@@ -6,13 +6,13 @@ import os
 import secrets
 import socket
 import sys
-from contextlib import redirect_stdout, suppress
+from contextlib import nullcontext, redirect_stdout, suppress
 from pathlib import Path
 from typing import Annotated, TextIO
 
 from miro_exact.bad_input import BadInput
 from mirotwin.debug.adapter import Adapter
-from mirotwin.debug.console import Console
+from mirotwin.debug.console import Console, history_kept
 from mirotwin.debug.subject import DebugSubject, open_subject
 from mirotwin.debug.wire import Wire
 from mirotwin.shell.command import Option, command_of
@@ -59,8 +59,8 @@ def debug(options: DebugOptions) -> int:
             return _serve(Wire(source, sink))
     debugger, notes, why = open_subject(options)
     console = Console(debugger)
-    console.say(why)
-    for line in (*notes, *console.lines):
+    console.session.say(why)
+    for line in (*notes, *console.session.lines):
         show_line(line)
     if not options.commands:
         return _interact(console)
@@ -123,13 +123,14 @@ def _interact(console: Console) -> int:
     terminal = _stdin("give commands by -x").isatty()
     if not terminal:
         console.prompt = console.completekey = ""
-    while not console.ended:
-        try:
-            console.cmdloop()
-        except KeyboardInterrupt:
-            if not terminal:
-                raise
-            complain("interrupted; `quit` leaves")
+    with history_kept() if terminal else nullcontext():
+        while not console.ended:
+            try:
+                console.cmdloop()
+            except KeyboardInterrupt:
+                if not terminal:
+                    raise
+                complain("interrupted; `quit` leaves")
     return DONE if console.done or terminal else BAD_INPUT
 
 

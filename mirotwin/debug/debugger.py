@@ -39,6 +39,7 @@ class Breakpoint(msgspec.Struct, eq=False):
     `written` is written, and `count` fits how often that was so since the run began.
 
     `text`: as it was entered; `note`: a remark on its place; `kind`: an editor's, which it sets together.
+    `once`: it is removed where it stops.
     `hits`: those that are counted, up to `counted_to`; each a number that grows with its cycle and its processor.
     """
 
@@ -53,6 +54,7 @@ class Breakpoint(msgspec.Struct, eq=False):
     log: Callable[[Moment], str] | None = None
     hits: array[int] = msgspec.field(default_factory=lambda: array("q"))
     counted_to: int = 0
+    once: bool = False
 
 
 class LogOutput(NamedTuple):
@@ -247,6 +249,8 @@ class Debugger:
     def move(self, verb: str, by_instruction: bool = False) -> str:
         """`continue`, `step`, `next`, `finish` or `stepi`; with an `r` before it backwards. Raises BadInput.
 
+        `until` is `next` which goes on to a later line.
+
         Steps are lines, or instructions where that is asked for or the image has no lines.
         """
         back, name = verb[0] == "r", verb.removeprefix("r")
@@ -254,9 +258,14 @@ class Debugger:
             return self._back() if back else self._forward()
         if name == "finish":
             return self._out_back() if back else self._out()
+        over = name in ("next", "until")
         if by_instruction or name == "stepi" or not self.symbols.line_begins:
-            return self._instruction_back(name == "next") if back else self._instruction(name == "next")
-        return self._line_back(name == "next") if back else self._line(name == "next")
+            return self._instruction_back(over) if back else self._instruction(over)
+        return self._line_back(over) if back else self._line(over, later=name == "until")
+
+    def run_to(self, addresses: Collection[int]) -> str:
+        """On to one of these places, or to a breakpoint before it."""
+        return self._forward(Trap(addresses, lambda core: True))
 
     def go_to(self, tick: int) -> str:
         """To a tick, or as near as the processor comes to it after it. A long way can be interrupted."""
@@ -314,6 +323,8 @@ class Debugger:
                     hit = seek(self._traps(step), here)
                     for breakpoint in self.breakpoints:
                         breakpoint.counted_to = max(breakpoint.counted_to, self.timeline.tick)
+        if hit is not None and isinstance(hit.found, Breakpoint) and hit.found.once:
+            self.breakpoints.remove(hit.found)
         return hit
 
     def _forward(self, step: Trap | None = None) -> str:
@@ -398,9 +409,10 @@ class Debugger:
         begins = cpu.pc == self.symbols.entry(cpu.pc)
         return _Line(self.symbols.unwinder.base(cpu), self.symbols.line(cpu.pc), level, begins)
 
-    def _line(self, over: bool) -> str:
+    def _line(self, over: bool, later: bool = False) -> str:
         """On to where another line begins, of this function, of its caller, or (not `over`) of one that it calls.
 
+        `later`: of this function only one that stands further down.
         Code without lines is passed to the next line, from before `main` wherever that is.
         """
         here = around = self._line_of(self.cpu)
@@ -414,6 +426,8 @@ class Debugger:
                 return None
             if there.base < around.base:
                 around = there  # it returned
+            if later and there.base == here.base and here.line is not None and there.line is not None:
+                return there if core.cpu.pc in begins and there.line.line > here.line.line else None
             return there if core.cpu.pc in begins and there[:2] != here[:2] else None
 
         return self._forward(Trap(returns.union(begins), ask))

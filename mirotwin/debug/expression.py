@@ -1,7 +1,7 @@
 """Expressions of the debugger: names, `.` `->` `[]` `*` `&`, arithmetic, comparisons, as C has them.
 
     age >= 110 && !heard     frame[2].left     *pointer     lm629.left.real_position - start     R7 == 0x3F     P1.0
-    eyes.distance_cm < 30    lcd.text == "READY"
+    eyes.distance_cm < 30    lcd.text == "READY"    $sp > 0x60
 
 An expression is read once into a function of a moment, which looks names up; so a condition costs little each time it
 is asked. Numbers do not wrap. Nothing is ever written.
@@ -20,14 +20,15 @@ import msgspec
 
 from miro_exact.bad_input import BadInput, did_you_mean, shortened
 from miro_robot.image.c_types import CType, Fields, value_of
-from miro_robot.mcs51.opcodes import BITS
+from miro_robot.mcs51.opcodes import BITS, SFRS
 
 _TOKEN = re.compile(
-    r"""\d+\.\d+|(?:[A-Za-z_]\w*:)?\w+|'(?:\\.|[^'\\])'|"(?:\\.|[^"\\])*"|->|<<|>>|[<>=!]=|&&|\|\||\S"""
+    r"""\d+\.\d+|\$\w+|(?:[A-Za-z_]\w*:)?\w+|'(?:\\.|[^'\\])'|"(?:\\.|[^"\\])*"|->|<<|>>|[<>=!]=|&&|\|\||\S"""
 )
 _MOST_CHARACTERS, _MOST_TOKENS, _MOST_SHIFT, _MOST_DIGITS = 4096, 128, 64, 80
 _LEVELS = ("||", "&&", "|", "^", "&", "== !=", "< <= > >=", "<< >>", "+ -", "* / %")
 _RANKS = {sign: rank for rank, signs in enumerate(_LEVELS) for sign in signs.split()}
+REGISTERS = (*(f"R{at}" for at in range(8)), "A", "B", "DPTR", "SP", "PSW", "PC", *SFRS)
 _ESCAPES = {"n": 10, "r": 13, "t": 9, "0": 0}
 MEMORY_OF_POINTER = {"DC": "code", "DX": "xram", "DP": "xram", "DD": "iram", "DI": "iram"}
 _GENERIC = {0x00: "xram", 0x40: "iram", 0x60: "xram", 0x80: "code"}
@@ -159,7 +160,7 @@ def _element(value: Value, index: int, text: str = "") -> Value:
     return _part(value, kind.element, index * kind.element.size)
 
 
-def _pointed(value: Value, index: Any, text: str) -> Value:
+def pointed(value: Value, index: Any, text: str) -> Value:
     """What a pointer points to, or so many elements after it; of an array its element."""
     if not isinstance(index, int):
         raise NoValue(f"[{index}] is no whole number")
@@ -239,7 +240,7 @@ def _either(stops: bool, left: Term, right: Term) -> Term:
 def _address(value: Value) -> Value:
     if not value.space:
         raise NoValue("has no address")
-    return Value(number=value.address, note=f"in {value.space}")
+    return Value(number=value.address, space=value.space, note=f"in {value.space}")
 
 
 class _Reader:
@@ -304,7 +305,10 @@ class _Reader:
                 self.expect("]")
             else:
                 target = _indexed(term, lambda moment: _ZERO, text) if how == "->" else term
-                term = _member_of(target, self.take(), text)
+                name = self.take()
+                if not name.isidentifier() and not name.isdecimal():
+                    raise self.refused("lacks the name of a member")
+                term = _member_of(target, name, text)
         return term
 
     def primary(self) -> Term:
@@ -318,10 +322,24 @@ class _Reader:
             if self.known and name not in self.known:
                 raise NoValue(f"there is no {name}", did_you_mean(name, self.known))
             return lambda moment: moment.find(name, module)
+        if token[:1] == "$" and len(token) > 1:
+            return self.register(token)
         constant = Value(number=_text(token) if token[:1] == '"' and len(token) > 1 else _constant(token))
         if constant.number is None:
             raise self.refused(f"lacks a name or a number{f' before {token}' if token else ''}")
         return lambda moment: constant
+
+    def register(self, token: str) -> Term:
+        """`$sp`, `$r7`: as gdb has them, the number in a register."""
+        name = token[1:].upper()
+        if name not in REGISTERS:
+            raise NoValue(f"{token} is no register", did_you_mean(name, REGISTERS))
+
+        def value(moment: Lookup) -> Value:
+            found = moment.find(name, "")
+            return Value(number=number(found), space="code" if name == "PC" else "")
+
+        return value
 
 
 def _text(token: str) -> str:
@@ -342,7 +360,7 @@ def _constant(token: str) -> int | float | None:
 
 
 def _indexed(term: Term, index: Term, text: str) -> Term:
-    return lambda moment: _pointed(term(moment), number(index(moment)), text)
+    return lambda moment: pointed(term(moment), number(index(moment)), text)
 
 
 def _member_of(term: Term, name: str, text: str) -> Term:

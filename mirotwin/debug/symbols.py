@@ -166,7 +166,7 @@ class Moment:
                 remedy = "it is a robot's, and this is the bare processor"
             raise NoValue(f"there is no {name} here", remedy)
         if symbol.space == "code":
-            return Value(number=symbol.address, note="an address of code")
+            return Value(number=symbol.address, space="code", note="an address of code")
         if symbol.space == "iram":
             self._refuse_shared(name, symbol.address, name.removeprefix("_").rpartition("_PARM_")[0])
         kind = _BIT if symbol.space == "bit" else _BYTE
@@ -328,7 +328,7 @@ class Moment:
         if name == "lm629" and board is not None:
             board.sync(cpu.cycles * CYCLE_TICKS)
             return Value(members={"left": partial(_chip, board.left), "right": partial(_chip, board.right)})
-        numbers = {"PC": cpu.pc, "DPTR": cpu.dptr, "cycle": cpu.cycles, "tick": cpu.cycles * CYCLE_TICKS}
+        numbers = {"PC": self.pc, "DPTR": cpu.dptr, "cycle": cpu.cycles, "tick": cpu.cycles * CYCLE_TICKS}
         return Value(number=numbers[name]) if name in numbers else None
 
     def _pins(self, port: int) -> Value:

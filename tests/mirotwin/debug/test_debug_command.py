@@ -43,9 +43,9 @@ def test_a_scenario_is_stepped_through_forwards_and_backwards(console):
     moves = ("break failsafe.c:147 if age >= 20", "continue", "where", "next", "rn", "who age")
     lines = console("fig6", lines=moves).splitlines()
     assert "breakpoint 1: failsafe.c:147 in failsafe_tick   if (age == FAILSAFE_STOP_MS) {" in lines[4]
-    assert lines[6:8] == ["*#0  failsafe.c:147 in failsafe_tick", " #1  main.c:50 in main"]
+    assert lines[6:8] == ["*#0  0x0518  failsafe.c:147 in failsafe_tick", " #1  0x0102  main.c:50 in main"]
     assert lines[11].partition("  ")[0] == lines[4].partition("  ")[0]
-    assert lines[14] == " #0  failsafe.c:146 in failsafe_tick"
+    assert lines[14] == " #0  0x0510  failsafe.c:146 in failsafe_tick"
 
 
 def test_a_list_is_around_the_line_asked_for_and_marks_the_one_it_stands_at(console):
@@ -62,7 +62,7 @@ def test_a_list_is_around_the_line_asked_for_and_marks_the_one_it_stands_at(cons
 
 
 def test_a_list_of_an_outer_frame_is_around_its_call(console):
-    out = console("fig6", lines=["break failsafe_look", "continue", "where 1", "list"])
+    out = console("fig6", lines=["break failsafe_look", "continue", "frame 1", "list"])
     called = next(line for line in out.splitlines() if line.startswith("*#1")).split(":")[1].split()[0]
     assert f"\n=> {called:>4}  " in out
 
@@ -174,12 +174,36 @@ def test_a_case_whose_check_is_in_a_file_opens_with_it(mirotwin, tmp_path):
         ("until edge pins=txd", "until edge: pins: unknown key; did you mean pin?"),
         ("until answer slot=9", "until answer: slot: is out of range; must be <= 4"),
         ("until answer seq=x", "until answer: seq: expected a whole number, got a string"),
-        ("next 3", "is more than next takes"),
+        ("finish 3", "is more than finish takes"),
+        ("next often", "is more than next takes"),
+        ("next 0", "give how often"),
         ("watch lm629.left.status", "lies in no memory that can be watched"),
         ("finish", "nothing called this function"),
-        ("where 7", "there is no frame 7"),
+        ("frame 7", "there is no frame 7"),
+        ("where x", "is no number of frames"),
+        ("down", "it is the innermost one"),
+        ("up", "it is the outermost one"),
         ("delete 5", "there is no breakpoint 5"),
-        ("jump", "is no command"),
+        ("jump", "nothing can be changed here: that would be another run"),
+        ("brake main", "brake: is no command; did you mean break?"),
+        ("1 + 2", "1: is no command"),
+        ("p/y age", "/y is no form; give one of x, d, u"),
+        ("p/i age", "/i is no form"),
+        ("x/8q age", "q is no form and no size"),
+        ("x", "lacks a place"),
+        ("x/-1x age", "is no form"),
+        ("x/4xb 0x1234", "is no place in iram; name the memory"),
+        ("x/300xb iram[0]", "iram ends at 0xff"),
+        ("x/4i age", "instructions are in code, and this is in iram"),
+        ("print $sq", "$sq is no register"),
+        ("display nothing", "there is no nothing here"),
+        ("undisplay 3", "there is no display 3"),
+        ("info", "of what?; there are breakpoints, "),
+        ("info moon", "is not known"),
+        ("info registers moon", "there is no moon here"),
+        ("help moon", "is no command"),
+        ("tbreak 9999", "no line has code from there on"),
+        ("list *moon", "no symbol moon"),
     ],
 )
 def test_a_command_that_cannot_be_done_is_one_line_and_exit_code_2(mirotwin, line, said):

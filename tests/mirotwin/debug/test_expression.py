@@ -26,6 +26,8 @@ class Numbers:
     def find(self, name, module):
         if name == "m":
             return Value(CType("array", 8, element=CType("int", 1), count=8), "iram", 0, self)
+        if name not in self.numbers:
+            raise NoValue(f"there is no {name}")
         return Value(number=self.numbers[name])
 
     def read(self, space, address, count):
@@ -79,7 +81,23 @@ def test_what_cannot_be_read_is_said(parts):
 @pytest.mark.parametrize(
     "text",
     [
-        *("", "1 +", "(1", "a b", "1 << 99", "1 / 0", "m[0.5]", "m[8]", "a[0]", "*a", "&a"),
+        *(
+            "",
+            "a.",
+            "a.-",
+            "$",
+            "$x",
+            "1 +",
+            "(1",
+            "a b",
+            "1 << 99",
+            "1 / 0",
+            "m[0.5]",
+            "m[8]",
+            "a[0]",
+            "*a",
+            "&a",
+        ),
         *("(" * 200 + "1" + ")" * 200, f"{9**300} * {9**300}"),
     ],
 )

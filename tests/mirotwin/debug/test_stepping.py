@@ -16,8 +16,10 @@ from miro_robot.inspect.writes import cpu_bit
 from miro_robot.mcs51.opcodes import disassemble
 from mirotwin.debug import timeline as timelines
 from mirotwin.debug.console import Console
+from mirotwin.debug.session import Session
 from mirotwin.debug.symbols import Symbols
 from mirotwin.debug.timeline import Timeline, Trap
+from mirotwin.debug.verbs import do
 from mirotwin.shell.progress import ProgressBar
 from tests.alone import Alone
 from tests.mirotwin.debug import proofs
@@ -223,13 +225,13 @@ def test_a_run_that_goes_on_within_an_instruction_begins_at_the_next_one():
 
 
 def test_until_that_is_interrupted_does_not_say_that_there_is_no_event(debugger):
-    console = Console(debugger)
+    session = Session(debugger)
     debugger.timeline.interrupted = lambda: True
-    console.do("until answer")
-    assert "interrupted: " in console.lines[-1]
+    do(session, "until answer")
+    assert "interrupted: " in session.lines[-1]
     debugger.timeline.interrupted = lambda: False
-    console.do("until touch")
-    assert "no such event before the end: " in console.lines[-1]
+    do(session, "until touch")
+    assert "no such event before the end: " in session.lines[-1]
 
 
 def test_a_long_search_shows_a_bar_and_tells_after_it(debugger, capsys, monkeypatch):

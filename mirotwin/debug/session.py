@@ -1,0 +1,97 @@
+"""What the verbs of the debugger work on: where it stands, the selected frame, and the lines that came of a command.
+
+What it prints of a moment is a time that `goto` takes, why it stopped, the place, and the C line or the instruction.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+
+from miro_exact.bad_input import BadInput
+from miro_exact.clock import CYCLE_TICKS, TICKS_PER_SECOND
+from miro_robot.image.symbol_files import SourceLine
+from miro_robot.inspect.frames import StackFrame
+from miro_robot.mcs51.opcodes import disassemble
+from mirotwin.debug.debugger import Debugger
+from mirotwin.debug.symbols import Moment
+
+
+class Session:
+    """One user. `lines`: what came of the last command; `why`: why it stopped, "" where it did not move.
+
+    `displays`: what is shown at each stop, by number; `examined`: where `x` goes on.
+    """
+
+    def __init__(self, debugger: Debugger) -> None:
+        self.debugger = debugger
+        self.symbols = debugger.symbols
+        self.timeline = debugger.timeline
+        self.lines: list[str] = []
+        self.tell = self.lines.append
+        self.frame = 0
+        self.why = ""
+        self.ended = False
+        self.displays: dict[int, tuple[str, Callable[[], list[str]]]] = {}
+        self.examined: Examined | None = None
+
+    def say(self, why: str, instruction: bool = False) -> None:
+        """Shows the output of logs, where it stands and why, and the displays. `instruction`: not the C line."""
+        self.frame, self.why = 0, why
+        for cycle, core, text, address in self.debugger.told:
+            self.tell(f"{self.time(cycle * CYCLE_TICKS, core)}{self.symbols.place(address)}: {text}")
+        self.debugger.told.clear()
+        cpu = self.debugger.cpu
+        line = None if instruction else self.symbols.line(cpu.pc)
+        source = "" if line is None else self.symbols.sources.text(line)
+        text = source or disassemble(cpu.code, cpu.pc, self.symbols.names)
+        asleep = " (asleep)" if cpu.idle or cpu.powered_down else ""
+        now = self.time(self.timeline.tick, self.timeline.focus)
+        self.tell(f"{now}{why}: {self.symbols.place(cpu.pc)}{asleep}   {text}")
+        self.show_displays()
+
+    def show_displays(self) -> None:
+        """One without a value here says why."""
+        for number, (text, show) in self.displays.items():
+            try:
+                shown = show()
+            except BadInput as error:
+                shown = [f"{text}: {error}"]
+            for line in shown:
+                self.tell(f"{number}: {line}")
+
+    def time(self, tick: int, core: int) -> str:
+        """A time that `goto` takes, and where there are several, of whom."""
+        hz, cores = self.timeline.run.tick_hz, self.timeline.cores
+        name = f"{cores[core].name}  " if len(cores) > 1 else ""
+        return (
+            f"{tick / hz:.7f}s  {name}" if hz == TICKS_PER_SECOND else f"{tick}t ({tick / hz:.6f} s)  {name}"
+        )
+
+    # The selected frame
+
+    def moment(self) -> Moment:
+        return self.debugger.moment(self.frame)
+
+    def here(self) -> StackFrame:
+        return self.debugger.frames()[self.frame]
+
+    def line_here(self) -> SourceLine | None:
+        """The C line of the frame; before `main` that of `main`."""
+        main = self.symbols.image.symbols.find("main")
+        line = self.symbols.line(self.here().place)
+        return self.symbols.line(main.address) if line is None and main is not None else line
+
+    def place(self, text: str) -> str:
+        """`147` is a line of the file that it stands in; `*0x123` and `*main` are addresses."""
+        if text[:1] == "*":
+            return text[1:].strip()
+        line = self.line_here() if text.isdecimal() else None
+        return text if line is None else f"{line.file}:{text}"
+
+
+class Examined:
+    """What `x` was asked for last: so many units of a form, from a memory; `address` is where the next one begins."""
+
+    def __init__(self) -> None:
+        self.count, self.form, self.size = 1, "x", 1
+        self.space, self.address = "", 0
