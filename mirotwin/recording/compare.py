@@ -20,7 +20,7 @@ import msgspec
 from miro_exact.clock import CONTROL_PERIOD_TICKS, HOST_CHARACTER_TICKS, NEVER_TICK, TICKS_PER_SECOND
 from miro_host.eye.track import Sighting
 from miro_host.posture import Posture
-from miro_sim.periods import Axis, Period, RobotPeriod
+from miro_sim.periods import Axis, Period, RobotId, RobotPeriod
 from mirotwin.recording import sequences
 from mirotwin.recording.difference import DIGEST, Difference
 from mirotwin.recording.sequences import LogEntry
@@ -64,6 +64,22 @@ class CompareRule(msgspec.Struct, frozen=True):
 
 
 EXACT = CompareRule()
+
+
+def robots_of(periods: Sequence[Period]) -> list[RobotId]:
+    """Network and slot of each robot, in the order of the world."""
+    return [(robot.network, robot.slot) for robot in periods[0].robots] if periods else []
+
+
+def only_robots(periods: Sequence[Period], robots: Sequence[RobotId]) -> Sequence[Period]:
+    """The periods with these of their robots, in this order."""
+    if robots_of(periods) == list(robots):
+        return periods
+    by_place = ({(robot.network, robot.slot): robot for robot in period.robots} for period in periods)
+    return [
+        msgspec.structs.replace(period, robots=tuple(places[robot] for robot in robots))
+        for period, places in zip(periods, by_place, strict=True)
+    ]
 
 
 def differences(

@@ -3,28 +3,27 @@
 from __future__ import annotations
 
 import os
-from collections.abc import Sequence
 from functools import partial
 from pathlib import Path
 from typing import Annotated, Any
 
+import msgspec
 from msgspec.structs import replace
 
 from miro_exact.bad_input import BadInput, amount
 from miro_exact.inputs import RECORDING_BYTES, check_no_folder, read_input
 from miro_robot.image import FLASH_BYTES, SPACE_BYTES
-from miro_sim.periods import Period, RobotId
 from miro_sim.scenario.board import BoardScenario
 from miro_sim.scenario.board_scenario import BoardText, load_any
-from mirotwin.recording.compare import CompareRule
+from mirotwin.recording.compare import CompareRule, only_robots, robots_of
 from mirotwin.recording.reader import parse
 from mirotwin.recording.writer import MAGIC
 from mirotwin.replay.difference import ComparedRun, RunDifference, compare_runs
 from mirotwin.replay.lockstep.annotated_image import annotated_of
 from mirotwin.replay.options import CompareOptions, check_reaches, extent, refuse_given, rule_as_json
-from mirotwin.replay.sources import source_differences
 from mirotwin.replay.text import difference_lines, difference_tables, source_tables
 from mirotwin.runs.job import DEFAULT_SCENARIO, load_job, recorded_spec, recording_notes
+from mirotwin.runs.made_from import MadeFrom, source_differences
 from mirotwin.runs.result import fault_lines
 from mirotwin.runs.run import Run, replaying
 from mirotwin.runs.spec import RunSpec
@@ -115,7 +114,8 @@ def diff(options: DiffOptions) -> int:
     alike = (spec.scenario, spec.seed) == (other_spec.scenario, other_spec.seed)
     difference = compare_runs(first, other, rule, (annotate, annotate), NAMES, alike)
     difference = replace(difference, notes=(*first.notes, *other.notes, *notes, *difference.notes))
-    origins = [*source_differences(first, other)]
+    made = [MadeFrom(run.ways[0], run.state, run.plugins) for run in (first, other)]
+    origins = [*source_differences(*made)]
     if options.shows:
         show(*source_tables(origins, NAMES), *difference_tables(difference, options.everything))
     code = _report(options, first, other, difference, alike=not origins)
@@ -123,7 +123,7 @@ def diff(options: DiffOptions) -> int:
         document: dict[str, Any] = {"a": file_in(options.a), "b": file_in(options.b)}
         if not first.recorded:
             document |= {"on": options.on, "seed": spec.seed}
-        document["sources"] = [each.as_json() for each in origins]
+        document["sources"] = msgspec.to_builtins(origins)
         document["periods"] = {"a": len(first.periods), "b": len(other.periods)}
         document |= rule_as_json(rule) | difference.as_json(options.everything) | {"exit_code": code}
         print_json(document)
@@ -213,7 +213,7 @@ def _run_images(options: DiffOptions) -> tuple[ComparedRun, ComparedRun]:
 
 def _with_same_robots(first: ComparedRun, other: ComparedRun) -> tuple[ComparedRun, ComparedRun]:
     """Both with the robots that both have, and a note on each that has more. Raises BadInput where none is in both."""
-    here, there = _robots(first), _robots(other)
+    here, there = robots_of(first.periods), robots_of(other.periods)
     if here == there:
         return first, other
     common = [place for place in here if place in there]
@@ -221,20 +221,11 @@ def _with_same_robots(first: ComparedRun, other: ComparedRun) -> tuple[ComparedR
     for name, run, robots in ((NAMES[0], first, here), (NAMES[1], other, there)):
         alone = [f"net{network}/robot{slot}" for network, slot in robots if (network, slot) not in common]
         notes = [*run.notes, *([f"only {name} has {', '.join(alone)}"] if alone else [])]
-        runs.append(replace(run, periods=[_only(period, common) for period in run.periods], notes=notes))
+        runs.append(replace(run, periods=only_robots(run.periods, common), notes=notes))
     if not common:
         both = "; ".join(note for run in runs for note in run.notes)
         raise BadInput("", "", f"the recordings have no robot in common: {both}")
     return runs[0], runs[1]
-
-
-def _robots(run: ComparedRun) -> list[RobotId]:
-    return [(robot.network, robot.slot) for robot in run.periods[0].robots]
-
-
-def _only(period: Period, robots: Sequence[RobotId]) -> Period:
-    by_place = {(robot.network, robot.slot): robot for robot in period.robots}
-    return replace(period, robots=tuple(by_place[place] for place in robots))
 
 
 def _rule(rule: CompareRule, run: ComparedRun, other: ComparedRun) -> tuple[CompareRule, list[str]]:

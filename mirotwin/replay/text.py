@@ -20,8 +20,8 @@ from mirotwin.replay.difference import RunDifference
 from mirotwin.replay.lockstep.firmwares import FirmwareDifference
 from mirotwin.replay.lockstep.instructions import InstructionDifference
 from mirotwin.replay.lockstep.variables import VariableDifference
-from mirotwin.replay.sources import SourceDifference
 from mirotwin.runs.job import Job
+from mirotwin.runs.made_from import SourceDifference
 from mirotwin.shell.console import plain_table
 
 LISTED = 5

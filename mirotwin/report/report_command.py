@@ -1,10 +1,11 @@
-"""`mirotwin report`: a run, a case or a failed test as one page."""
+"""`mirotwin report`: a run, a case, a failed test or two runs as one page."""
 
 from __future__ import annotations
 
 from pathlib import Path
 from typing import Annotated
 
+import click
 import msgspec
 from msgspec.structs import replace
 
@@ -18,6 +19,7 @@ from mirotwin.report.page.board_page import board_page
 from mirotwin.report.page.bokeh_page import require_bokeh
 from mirotwin.report.page.document import check_size, place_of_page, write_page
 from mirotwin.report.page.frames import Extras, extras_of
+from mirotwin.report.page.pair_page import Side, pair_page
 from mirotwin.report.page.port_page import port_page
 from mirotwin.report.page.run_page import Material, run_page
 from mirotwin.report.page.watched_run import WatchedRun, run_again
@@ -43,6 +45,7 @@ SMALLER = "leave the camera's frames out with --no-frames, or look at a part wit
 class ReportOptions(Options, frozen=True, kw_only=True):
     COMMAND = "report"
     subject: Annotated[str, Argument("RUN|CASE|TEST-FAILURE", NAME)]
+    other: Annotated[str | None, Argument("[OTHER-RUN]", NAME)] = None
     out: Annotated[
         Path | None, OUT.saying("The page to write. Default: report.html, which replaces an earlier page.")
     ] = None
@@ -73,6 +76,8 @@ class ReportOptions(Options, frozen=True, kw_only=True):
 def report(options: ReportOptions) -> int:
     """Writes one HTML file that needs no network: look at it in any browser, send it, keep it with a build.
 
+    Of RUN and OTHER-RUN, one page shows both, one over the other, and where they first differ.
+
     RUN is a folder of `mirotwin run`, or a recording (run.mcap, run.part.mcap); CASE a case (FILE.stream) as `test`,
     `fuzz` and `conform` leave it; TEST-FAILURE the folder that a failed test of pytest or `mirotwin test` leaves.
     `mirotwin campaign page` makes the page of a campaign.
@@ -80,14 +85,19 @@ def report(options: ReportOptions) -> int:
     A run is made again for its page, with the recorded bytes: the profile of the firmware, its coverage, the fate of
     each frame and the verdicts of the checks come from that, and where it differs from the recording is said.
     """
-    subject = options.subject
-    place = place_of_page(options.out, options.force, subject, options.firmware)
-    if is_campaign(subject):
-        remedy = f"`mirotwin campaign page {subject}` makes its page"
-        raise BadInput(subject, "", "holds the results of a campaign", remedy)
+    subject, other = options.subject, options.other
+    if other is not None and (given := options.given("firmware", "sources", "no_frames")):
+        raise click.UsageError(f"{given[0]} is for the page of one run.")
+    place = place_of_page(options.out, options.force, subject, other, options.firmware)
+    for file in filter(None, (subject, other)):
+        if is_campaign(file):
+            remedy = f"`mirotwin campaign page {file}` makes its page"
+            raise BadInput(file, "", "holds the results of a campaign", remedy)
     checked_sources(options.sources)
     bring_parts(options.parts)
-    made = page_of(options)
+    made = (
+        page_of(options) if other is None else pair_page(*(_side(options, file) for file in (subject, other)))
+    )
     check_size(made, subject, SMALLER)
     return write_page(place, made, options.quiet)
 
@@ -114,6 +124,26 @@ def page_of(wanted: ReportOptions, name: str = "") -> bytes:
         return port_page(job, wanted.quiet)
     material = _of_recording(wanted, job) if job.recorded else _of_case(wanted, job, name)
     return board_page(material, *_ticks_of(wanted, material)) if job.alone else run_page(material)
+
+
+def _side(wanted: ReportOptions, subject: str) -> Side:
+    """One of two runs: as it was recorded, or what a case or a stream file does. Raises BadInput."""
+    job = load_job(_file_of(subject))
+    file = Path(job.spec.origin)
+    if job.alone or job.origin:
+        what = "a board" if job.alone else "what was recorded at a port"
+        raise BadInput(
+            f"{file}", "", f"is of {what}: two runs of robots have one page", "give one file for its page"
+        )
+    complain(*job.notes)
+    shown = wanted.shown(job)
+    periods = job.recorded or run_again(job, job.case.end_tick or None, wanted.quiet).periods
+    periods = [period for period in periods if period.index in shown]
+    if not periods:
+        place = f"--from {wanted.from_time}"
+        raise BadInput(f"{file}", place, f"the run ends at tick {job.end_tick}", "look earlier")
+    name = file.absolute().parent.name if file.name in (*RECORDINGS, *CASES) else file.name
+    return Side(name, job, periods)
 
 
 def _ticks_of(wanted: ReportOptions, material: Material) -> tuple[int, int]:

@@ -47,8 +47,8 @@ def figures_of(tracks: PageTracks, marks: Sequence[LinkMark], failure_ticks: Seq
     times = time_range(tracks.times_s, PERIOD_S)
     made: Figures = {}
     if any(robot.steered for robot in tracks.robots):
-        made["plot-position"] = _errors(tracks, times, "position error [cm]", SETTLED_CM, _position)
-        made["plot-heading"] = _errors(tracks, times, "heading error [rad]", SETTLED_RAD, _heading)
+        made["plot-position"] = _errors(tracks, times, "position error [cm]", SETTLED_CM, position_of)
+        made["plot-heading"] = _errors(tracks, times, "heading error [rad]", SETTLED_RAD, heading_of)
     made["plot-v"] = _speeds(tracks, times, "v [m/s]", "v_m_s", LEAST_M_S)
     made["plot-w"] = _speeds(tracks, times, "\u03c9 [rad/s]", "w_rad_s", LEAST_RAD_S)
     for side in SIDES:
@@ -64,28 +64,28 @@ def figures_of(tracks: PageTracks, marks: Sequence[LinkMark], failure_ticks: Seq
     return made
 
 
-def _position(errors: Any) -> Any:
+def position_of(errors: Any) -> Any:
     x_cm, y_cm = np.array(errors.x_cm), np.array(errors.y_cm)
     return np.sqrt(x_cm * x_cm + y_cm * y_cm)
 
 
-def _heading(errors: Any) -> Any:
+def heading_of(errors: Any) -> Any:
     return np.array(errors.theta_rad)
 
 
 def _errors(tracks: PageTracks, times: Any, label: str, band: float, value_of: Callable[[Any], Any]) -> Any:
     made = panel(label, times, x_label="t [s]")
-    low = 0.0 if value_of is _position else -band
+    low = 0.0 if value_of is position_of else -band
     shaded = BoxAnnotation(bottom=low, top=band, fill_alpha=1.0, line_color=None, level="underlay")
     made.add_layout(tagged(shaded, fill_color="band"))
     for number, robot in enumerate(tracks.robots):
-        points = {"t": _times(robot.measured_errors.ticks), "value": value_of(robot.measured_errors)}
+        points = {"t": seconds_at(robot.measured_errors.ticks), "value": value_of(robot.measured_errors)}
         dots = made.scatter(
             "t", "value", source=ColumnDataSource(points), size=3.5, line_color=None, fill_alpha=0.7
         )
         _of_robot(dots, number, fill_color="measured")
-        truth = {"t": _times(robot.errors.ticks), "value": value_of(robot.errors)}
-        _line(made, number, ColumnDataSource(truth), "value", "truth", 1.8)
+        truth = {"t": seconds_at(robot.errors.ticks), "value": value_of(robot.errors)}
+        line(made, number, ColumnDataSource(truth), "value", "truth", 1.8)
     return made
 
 
@@ -93,10 +93,10 @@ def _speeds(tracks: PageTracks, times: Any, label: str, name: str, least: float)
     made = panel(label, times, x_label="t [s]")
     for number, robot in enumerate(tracks.robots):
         columns = {"truth": np.array(getattr(robot, name)), "told": np.array(getattr(robot, f"told_{name}"))}
-        source = ColumnDataSource({"t": _times(tracks.ticks), **columns})
-        _line(made, number, source, "told", "told", 1.4, mode="after")
-        _line(made, number, source, "truth", "truth", 1.8)
-        _widen(made, number, tracks, least, columns["truth"], columns["told"])
+        source = ColumnDataSource({"t": seconds_at(tracks.ticks), **columns})
+        line(made, number, source, "told", "told", 1.4, mode="after")
+        line(made, number, source, "truth", "truth", 1.8)
+        widen(made, number, tracks, least, columns["truth"], columns["told"])
     return made
 
 
@@ -104,19 +104,19 @@ def _wheel(tracks: PageTracks, times: Any, side: str) -> Any:
     made = panel(f"{side} [m/s]", times, x_label="t [s]")
     for number, robot in enumerate(tracks.robots):
         wheel, fine = robot.wheels[side], robot.fine[side]
-        period_times = _times(tracks.ticks)
+        period_times = seconds_at(tracks.ticks)
         columns = {name: np.array(getattr(wheel, name)) for name in ("told", "actual")}
         source = ColumnDataSource({"t": period_times, **columns})
         of_profile = (fine.times_s, fine.values) if len(fine.values) else (period_times, wheel.profile)
         profile = ColumnDataSource({"t": np.array(of_profile[0]), "profile": np.array(of_profile[1])})
-        _line(made, number, source, "told", "told", 1.0, mode="after")
-        _line(made, number, profile, "profile", "profile", 1.6)
-        _line(made, number, source, "actual", "truth", 1.6)
-        _widen(made, number, tracks, LEAST_M_S, columns["told"], columns["actual"], of_profile[1])
+        line(made, number, source, "told", "told", 1.0, mode="after")
+        line(made, number, profile, "profile", "profile", 1.6)
+        line(made, number, source, "actual", "truth", 1.6)
+        widen(made, number, tracks, LEAST_M_S, columns["told"], columns["actual"], of_profile[1])
     return made
 
 
-def _widen(made: Any, number: int, tracks: PageTracks, least: float, *columns: Any) -> None:
+def widen(made: Any, number: int, tracks: PageTracks, least: float, *columns: Any) -> None:
     """Makes the axis of one robot span `least` where its numbers vary by less: by two invisible points."""
     if (ends := at_least(least, *columns)) is not None:
         source = ColumnDataSource({"t": [tracks.times_s[0]] * 2, "value": list(ends)})
@@ -131,7 +131,7 @@ def lanes_figure(
     colours: Mapping[str, str] = KIND_COLOURS,
 ) -> Any:
     """Marks on their lanes. `seconds_of` ticks of another crystal than the robot's; `colours` of other kinds."""
-    lanes, seconds_of = lanes_of(marks), seconds_of or _times
+    lanes, seconds_of = lanes_of(marks), seconds_of or seconds_at
     made = panel(
         "",
         times,
@@ -162,7 +162,7 @@ def lanes_figure(
     return made
 
 
-def _line(made: Any, number: int, source: Any, name: str, colour: str, width: float, **step: str) -> None:
+def line(made: Any, number: int, source: Any, name: str, colour: str, width: float, **step: str) -> None:
     """A column against time; `mode`: in steps."""
     draw = made.step if step else made.line
     _of_robot(draw("t", name, source=source, line_width=width, **step), number, line_color=colour)
@@ -174,5 +174,5 @@ def _of_robot(renderer: Any, number: int, **colours: str) -> None:
     tagged(renderer.glyph, **colours)
 
 
-def _times(ticks: Any) -> Any:
+def seconds_at(ticks: Any) -> Any:
     return np.array(ticks, dtype=np.float64) / TICKS_PER_SECOND

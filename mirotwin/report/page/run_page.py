@@ -81,10 +81,11 @@ def run_page(material: Material) -> bytes:
         "facts": _facts(material, tracks),
         "tracks": tracks,
         "pitch": pitch_of(tracks),
+        "pitch_shows": "where each robot is, should be and was seen",
         "kinds": [(kind, colour) for kind, colour in KIND_COLOURS.items() if kind in kinds],
         "lanes": [(lane, Counter(one.kind for one in marks if one.lane == lane)) for lane in lanes_of(marks)],
     }
-    return render("run.html", figures, _data(tracks, marks, material.extras.frames, ticks), values)
+    return render("run.html", figures, page_data(tracks, marks, material.extras.frames, ticks), values)
 
 
 def shared(material: Material, clock: int) -> dict[str, Any]:
@@ -105,16 +106,26 @@ def shared(material: Material, clock: int) -> dict[str, Any]:
     }
 
 
+class Body(msgspec.Struct, frozen=True):
+    """A robot on the pitch. `dots`: its measured places as one SVG path; `seen`: whether the last of them is drawn."""
+
+    colour: int
+    label: str
+    steered: bool
+    dots: str = ""
+    seen: bool = False
+
+
 class Pitch(msgspec.Struct, frozen=True):
     """The pitch as SVG: field, paths, and robots that the page's JavaScript moves.
 
     `view_box` takes in the whole pitch and all paths. `paths`: number of the robot, truth or reference, and points as
-    an SVG polyline has them; `dots`: of each robot the measured places, as one SVG path.
+    an SVG polyline has them.
     """
 
     view_box: str
     paths: list[tuple[int, str, str]]
-    dots: list[str]
+    bodies: list[Body]
     left: float = 100.0 * ground.LEFT_M
     bottom: float = 100.0 * ground.BOTTOM_M
     length: float = 100.0 * ground.LENGTH_M
@@ -122,8 +133,9 @@ class Pitch(msgspec.Struct, frozen=True):
     half: float = 100.0 * ground.ROBOT_HALF_M
 
 
-def pitch_of(tracks: PageTracks) -> Pitch:
-    paths, dots = [], []
+def pitch_of(tracks: PageTracks, bodies: Sequence[tuple[int, str]] = ()) -> Pitch:
+    """`bodies`: colour and label of each; default: those of one run, with what the camera measured."""
+    paths, drawn = [], []
     corners = [
         (100.0 * ground.LEFT_M, 100.0 * ground.BOTTOM_M),
         (100.0 * ground.RIGHT_M, 100.0 * ground.TOP_M),
@@ -134,11 +146,16 @@ def pitch_of(tracks: PageTracks) -> Pitch:
             places = _places(postures)
             corners += [(x, y) for x, y in places if math.isfinite(x + y)]
             paths.append((number, kind, " ".join(f"{x:.2f},{y:.2f}" for x, y in places)))
+        if bodies:
+            drawn.append(Body(*bodies[number], robot.steered))
+            continue
         measured = [place for place in _places(robot.measured) if not math.isnan(place[0])]
-        dots.append("".join(f"M{x:.2f} {y:.2f}h0" for x, y in measured))
+        dots = "".join(f"M{x:.2f} {y:.2f}h0" for x, y in measured)
+        label = f"{robot.id[1]}" if len(tracks.robots) > 1 else ""
+        drawn.append(Body(number % 5, label, robot.steered, dots, True))
     left, right = min(x for x, _ in corners) - MARGIN_CM, max(x for x, _ in corners) + MARGIN_CM
     bottom, top = min(y for _, y in corners) - MARGIN_CM, max(y for _, y in corners) + MARGIN_CM
-    return Pitch(f"{left:.2f} {-top:.2f} {right - left:.2f} {top - bottom:.2f}", paths, dots)
+    return Pitch(f"{left:.2f} {-top:.2f} {right - left:.2f} {top - bottom:.2f}", paths, drawn)
 
 
 def _places(postures: Postures) -> list[tuple[float, float]]:
@@ -188,10 +205,17 @@ def _facts(material: Material, tracks: PageTracks) -> list[tuple[str, str, str]]
     return facts
 
 
-def _data(
-    tracks: PageTracks, marks: Sequence[LinkMark], frames: Sequence[CameraFrame], ticks: Sequence[int]
+def page_data(
+    tracks: PageTracks,
+    marks: Sequence[LinkMark],
+    frames: Sequence[CameraFrame],
+    ticks: Sequence[int],
+    pairs: int = 0,
 ) -> bytes:
-    """The data of the page's JavaScript: postures as 64-bit floats in base64, so that none is rounded."""
+    """The data of the page's JavaScript: postures as 64-bit floats in base64, so that none is rounded.
+
+    `ticks`: of failures. `pairs`: so many robots are compared, each with the one that comes so many after it.
+    """
     lanes = lanes_of(marks)
     kinds = list(dict.fromkeys(mark.kind for mark in marks))
     return json_bytes(
@@ -200,7 +224,8 @@ def _data(
             "ticks": tracks.ticks,
             "period_ticks": CONTROL_PERIOD_TICKS,
             "ticks_per_s": TICKS_PER_SECOND,
-            "robots": [_robot(robot) for robot in tracks.robots],
+            "robots": [_robot(robot, len(tracks.ticks)) for robot in tracks.robots],
+            "pairs": pairs,
             "failures": sorted(set(ticks)),
             "lanes": lanes,
             "kinds": kinds,
@@ -213,23 +238,26 @@ def _data(
     )
 
 
-def _robot(robot: PageTrack) -> dict[str, Any]:
+def _robot(robot: PageTrack, count: int) -> dict[str, Any]:
     return {
         "name": robot.name,
         "network": robot.id[0],
         "steered": robot.steered,
-        "truth": _packed(robot.truth),
-        "reference": _packed(robot.reference),
-        "measured": _packed(robot.measured),
-        "v": _base64(robot.v_m_s),
-        "w": _base64(robot.w_rad_s),
+        "truth": _packed(robot.truth, count),
+        "reference": _packed(robot.reference, count),
+        "measured": _packed(robot.measured, count),
+        "v": _base64(robot.v_m_s, count),
+        "w": _base64(robot.w_rad_s, count),
     }
 
 
-def _packed(postures: Postures) -> list[str]:
-    return [_base64(one) for one in (postures.x_m, postures.y_m, postures.theta_rad)]
+def _packed(postures: Postures, count: int) -> list[str]:
+    return [_base64(one, count) for one in (postures.x_m, postures.y_m, postures.theta_rad)]
 
 
-def _base64(numbers: Column) -> str:
-    """Little-endian."""
-    return base64.b64encode(np.asarray(numbers, "<f8").tobytes()).decode()
+def _base64(numbers: Column, count: int) -> str:
+    """Little-endian, `count` of them: NaN after the end of a run that is shorter than the other one of its page."""
+    values = np.asarray(numbers, "<f8")
+    return base64.b64encode(
+        np.append(values, np.full(count - len(values), np.nan)).astype("<f8").tobytes()
+    ).decode()

@@ -24,7 +24,7 @@
     const [xs, ys] = robots[Number(line.dataset.robot)].truth;
     const lengths = new Float64Array(xs.length);
     for (let at = 1; at < xs.length; at += 1) {
-      lengths[at] = lengths[at - 1] + 100 * Math.hypot(xs[at] - xs[at - 1], ys[at] - ys[at - 1]);
+      lengths[at] = lengths[at - 1] + (100 * Math.hypot(xs[at] - xs[at - 1], ys[at] - ys[at - 1]) || 0);
     }
     return { line, lengths };
   });
@@ -54,6 +54,10 @@
     row("now-measured", ...at(measured));
     row("now-reference", ...at(reference));
     row("now-error", ...at(truth).map((value, axis) => value - reference[axis][index]));
+    if (!data.pairs) return;
+    const other = at(robots[run.robot + data.pairs].truth);
+    row("now-other", ...other);
+    row("now-apart", ...at(truth).map((value, axis) => other[axis] - value));
   }
 
   function tellLink(begin) {

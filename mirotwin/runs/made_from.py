@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 from hashlib import sha256
-from typing import Any
+from typing import Any, NamedTuple
 
 import msgspec
 
@@ -12,11 +12,18 @@ from miro_exact.bad_input import amount
 from miro_robot.image import Image
 from miro_robot.inspect.symbol_names import SymbolNames
 from mirotwin.recording.difference import shown
-from mirotwin.replay.difference import ComparedRun
-from mirotwin.replay.lockstep.fields import Record
+from mirotwin.runs.spec import RunSpec
 
 
-class SourceDifference(Record, frozen=True):
+class MadeFrom(NamedTuple):
+    """The sources of a run. `state`: the form of its states, and `plugins` that it used, as its recording has them."""
+
+    spec: RunSpec
+    state: str = ""
+    plugins: tuple[str, ...] = ()
+
+
+class SourceDifference(msgspec.Struct, frozen=True):
     """`key`: `seed`, `firmware`, or a key of the scenario as for `--set`. Values as text, "nothing" for none."""
 
     key: str
@@ -24,9 +31,9 @@ class SourceDifference(Record, frozen=True):
     b: str
 
 
-def source_differences(first: ComparedRun, other: ComparedRun) -> Iterator[SourceDifference]:
+def source_differences(first: MadeFrom, other: MadeFrom) -> Iterator[SourceDifference]:
     """Seed, firmware, and the keys of the scenario that differ, those that a scenario leaves out included."""
-    spec, other_spec = first.ways[0], other.ways[0]
+    spec, other_spec = first.spec, other.spec
     if spec.seed != other_spec.seed:
         yield SourceDifference("seed", str(spec.seed), str(other_spec.seed))
     if spec.image.sha256 != other_spec.image.sha256:
