@@ -26,7 +26,10 @@ def pytest_collection_finish():
 
 
 def pytest_runtest_teardown(item, nextitem):
-    """A command forgets the checks that it took from files with its process; here tests of many files share one."""
+    """A command forgets the plug-ins that it took from files with its process; here tests of many files share one."""
     expect = sys.modules.get("mirotwin.verify.checks.expect")
     if expect is not None and (nextitem is None or nextitem.path != item.path):
         expect.CHECKS.in_files.clear()
+    files = sys.modules.get("mirotwin.shell.plugin_files")
+    if files is not None and (nextitem is None or nextitem.path != item.path):
+        files.PluginFiles().bring()

@@ -68,8 +68,8 @@ class Registry(msgspec.Struct, Generic[Plugin], frozen=True, eq=False):
             return self._checked(_loaded(self.own[name]), name, self.own[name])
         if entry is None:
             names = self.names()
-            remedy = did_you_mean(name, names, use_one_of(names))
-            raise PluginError(f"{name!r} is not one of the choices", remedy)
+            own = f"{use_one_of(names)}, or one of your own: --{self.word} FILE.py:CLASS"
+            raise PluginError(f"{name!r} is not one of the choices", did_you_mean(name, names, own))
         owner = installed.owner(entry)
         entry_point = f"{entry.value}, from {owner}"
         try:

@@ -26,6 +26,7 @@ from mirotwin.shell.options import (
     refuse_steps,
 )
 from mirotwin.shell.outputs import check_new, whole_file
+from mirotwin.shell.plugin_files import PluginFiles
 from mirotwin.shell.program import report_lines, show_line, tell_notes
 from mirotwin.shell.progress import ProgressBar
 from mirotwin.shell.times import Time
@@ -42,6 +43,7 @@ class LookOptions(Options, frozen=True, kw_only=True):
     network: Annotated[int, NETWORK.saying("Whose camera and tracker.")] = 0
     settings: Settings = ()
     firmware: Firmware = None
+    plugins: PluginFiles = PluginFiles()
     plain: Annotated[bool, Option(help="The picture alone, 320 x 240, as the PC gets it.")] = False
     force: Annotated[bool, FORCE] = False
     engine: Engine = None
@@ -57,7 +59,8 @@ def look(options: LookOptions) -> int:
     named.
     """
     scenario, seed, network, moment = options.scenario, options.seed, options.network, options.at
-    text = load(scenario, options.settings)
+    options.plugins.bring()
+    text = load(scenario, (*options.plugins.settings(options.settings), *options.settings))
     tell_notes(text.notes)
     refuse_steps(text.scenario, scenario)
     frame = moment.ticks() // CONTROL_PERIOD_TICKS

@@ -23,6 +23,7 @@ from mirotwin.campaign.workers import Processes
 from mirotwin.shell.command import Argument, Option, Options, command_of
 from mirotwin.shell.options import FORCE, JOBS, OUT, PATH, QUIET, SET, Engine
 from mirotwin.shell.outputs import told_when_full
+from mirotwin.shell.plugin_files import PluginFiles
 from mirotwin.shell.program import complain, show_line, tell_notes
 from mirotwin.shell.progress import ProgressBar
 from mirotwin.shell.verdicts import DONE, exit_code
@@ -45,6 +46,7 @@ class CampaignOptions(Options, frozen=True, kw_only=True):
         SET.saying("A key of the scenario, for all runs, as `mirotwin run` has it; may be repeated."),
     ] = ()
     expected: Expected = ()
+    plugins: PluginFiles = PluginFiles()
     jobs: Annotated[int | None, JOBS] = None
     engine: Engine = None
     force: Annotated[bool, FORCE.saying("Replace results that are there, or parts of them.")] = False
@@ -64,7 +66,10 @@ def run(options: CampaignOptions) -> int:
     a check, or had no occasion for it. The rows say which.
     """
     require_arrow()
-    plan = load(options.file, (*options.settings, *as_settings(options.expected, files=False)))
+    options.plugins.bring()
+    settings = (*options.plugins.settings(options.settings), *options.settings)
+    plan = load(options.file, (*settings, *as_settings(options.expected, files=False)))
+    plan = replace(plan, plugins=options.plugins)
     tell_notes(plan.notes)
     if options.seeds is not None:
         first, count = options.seeds[0], len(options.seeds)

@@ -29,6 +29,7 @@ from mirotwin.runs.spec import RunSpec
 from mirotwin.shell.firmware_image import image_for
 from mirotwin.shell.json_text import json_bytes
 from mirotwin.shell.options import plain_parameters
+from mirotwin.shell.plugin_files import PluginFiles
 from mirotwin.verify.steps.keys import CheckStep, Step, WaitStep
 from mirotwin.verify.steps.player import check_symbols
 
@@ -60,7 +61,7 @@ class Plan(msgspec.Struct, frozen=True):
     """A campaign. What its file says: `path` names the file in errors; `settings`: what all runs set, each with the
     place that says it.
 
-    `values`: those of a board's parts that its rows have, by PART.KEY.
+    `values`: those of a board's parts that its rows have, by PART.KEY. `plugins`: those that the command line brought.
 
     What `checked` adds: `scenarios` (whole texts), `images`: by the names and paths that the file uses, that of a board
     by its scenario; `checks`: names of all checks, in the order in which they are met; `figures`: columns of the rows
@@ -74,6 +75,7 @@ class Plan(msgspec.Struct, frozen=True):
     settings: tuple[tuple[str, str], ...] = ()
     allowed_failed_share: float = 0.0
     values: tuple[str, ...] = ()
+    plugins: PluginFiles = PluginFiles()
     scenarios: Mapping[str, str] = {}
     images: Mapping[str, ImageCopy] = {}
     checks: tuple[str, ...] = ()
@@ -127,6 +129,7 @@ class Plan(msgspec.Struct, frozen=True):
             engine=engine.active(),
             versions=self.versions,
             values={path: self.figures[path] for path in self.values if path in self.figures},
+            brought=msgspec.structs.asdict(self.plugins),
         )
 
     def varied(self, run: int) -> dict[str, Value]:

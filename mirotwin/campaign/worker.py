@@ -31,7 +31,7 @@ class Work(msgspec.Struct, frozen=True):
     """One run: a whole scenario as text, `settings` to make in it, and a seed. `run`: its number in the plan.
 
     `values`: the values of parts that its row has, and their types. `recording`: the file for a recording, if it is
-    recorded.
+    recorded. `brought`: files with plug-ins, by the fields of `mirotwin.shell.plugin_files.PluginFiles`.
     """
 
     run: int
@@ -44,6 +44,7 @@ class Work(msgspec.Struct, frozen=True):
     versions: Versions
     values: Mapping[str, type] = {}
     recording: str = ""
+    brought: Mapping[str, tuple[str, ...]] = {}
 
 
 class RunOutcome(msgspec.Struct, frozen=True, omit_defaults=True):
@@ -67,13 +68,24 @@ class RunOutcome(msgspec.Struct, frozen=True, omit_defaults=True):
 
 def work(job: Work) -> RunOutcome:
     """Runs a job to its end, whatever happens to the run. Raises BadInput where this process is not as the job's."""
-    difference = job.versions.difference(versions_here(job.versions)) or _engine(job.engine)
+    difference = _engine(job.engine)
+    if not difference:
+        _bring(tuple(job.brought.items()))
+        difference = job.versions.difference(versions_here(job.versions))
     if difference:
         worker = f"worker {socket.gethostname()} process {os.getpid()}"
         raise BadInput("", worker, f"has {difference}", "install there what runs here")
     from mirotwin.campaign.single import run_single  # loads hot modules
 
     return run_single(job)
+
+
+@cache
+def _bring(files: tuple[tuple[str, tuple[str, ...]], ...]) -> None:
+    if any(given for _, given in files):
+        from mirotwin.shell.plugin_files import PluginFiles  # loads hot modules
+
+        PluginFiles(**dict(files)).bring()
 
 
 @cache

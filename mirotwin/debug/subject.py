@@ -40,7 +40,7 @@ class DebugSubject(SubjectOptions, frozen=True, kw_only=True):
     sources: SourceFolders = ()
 
 
-_NAMES = {"settings": "set", "parts": "part"}
+_NAMES = {"settings": "set"}
 """Options that are called otherwise than their fields."""
 
 
@@ -49,8 +49,9 @@ def launched(given: Mapping[str, Any]) -> DebugSubject:
 
     `linesFrom` is `--lines-from` there.
     """
-    fields = [name for name in DebugSubject.__struct_fields__ if name not in ("bare", "subject", "expected")]
-    options = [_NAMES.get(name, name.replace("_", "-")) for name in fields]
+    left_out = ("bare", "subject", "expected", "plugins")
+    fields = [name for name in DebugSubject.__struct_fields__ if name not in left_out]
+    options = ["part", *(_NAMES.get(name, name.replace("_", "-")) for name in fields)]
     keys = {re.sub("-(.)", lambda match: match[1].upper(), option): option for option in options}
     words: list[str] = []
     for key, option in keys.items():

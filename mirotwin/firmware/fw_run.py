@@ -37,7 +37,7 @@ from mirotwin.firmware.bare_options import (
 from mirotwin.shell.command import Argument, Option, Options, command_of
 from mirotwin.shell.options import NAME, PATH, Engine
 from mirotwin.shell.outputs import check_file, whole_file
-from mirotwin.shell.part_files import Parts, bring_parts
+from mirotwin.shell.plugin_files import Parts, PluginFiles
 from mirotwin.shell.program import complain
 from mirotwin.shell.progress import ProgressBar
 
@@ -179,7 +179,7 @@ def run(options: FwRunOptions) -> int:
         --stdin-when '> ' --stdin commands.txt --stdin-by-line
     """
     image, bare, dump = options.image, options.bare, options.dump
-    bring_parts(options.parts)
+    PluginFiles(parts=options.parts).bring()
     if dump is not None:
         check_file(dump, "--dump", image, *options.more, *bare.files)
     if options.terminal:

@@ -43,7 +43,7 @@ from mirotwin.shell.options import (
     plain_parameters,
     refuse_steps,
 )
-from mirotwin.shell.part_files import Parts, bring_parts
+from mirotwin.shell.plugin_files import PluginFiles
 from mirotwin.shell.program import complain, report_lines, tell_notes
 from mirotwin.shell.progress import ProgressBar
 from mirotwin.shell.times import Time, window
@@ -71,7 +71,7 @@ class SubjectOptions(Options, frozen=True, kw_only=True):
     ] = ()
     network: Annotated[int | None, NETWORK.saying("Network of the robot. Default 0.")] = None
     slot: Annotated[int | None, SLOT.saying("Slot of the robot. Default: the lowest slot used.")] = None
-    parts: Parts = ()
+    plugins: PluginFiles = PluginFiles()
     engine: Engine = None
     bare: BareOptions = BareOptions()
 
@@ -119,7 +119,7 @@ def open_window(options: WindowOptions) -> InspectedRun:
 
 def open_run(options: SubjectOptions) -> InspectedRun:
     """The requested run, at its first tick. Raises BadInput."""
-    bring_parts(options.parts)
+    options.plugins.bring()
     subject = options.subject
     if subject.lower().endswith(IMAGE_SUFFIXES):
         return _image_run(options, subject, options.bare)
@@ -186,7 +186,7 @@ def _robot_run(options: SubjectOptions) -> InspectedRun:
     end_tick, job = None, None
     if subject in builtin_names() or subject.endswith(".toml") or not is_path:
         _refuse(options, "a scenario, of which nothing is judged here", "expected")
-        text = load_any(subject, options.settings)
+        text = load_any(subject, (*options.plugins.settings(options.settings), *options.settings))
         tell_notes(text.notes)
         spec = RunSpec.of(text, image_for(text, options.firmware), options.seed or 0)
         with plain_parameters(subject):

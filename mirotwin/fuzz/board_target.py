@@ -33,7 +33,7 @@ from mirotwin.fuzz.spec import TargetSpec
 from mirotwin.fuzz.target import NEVER_SLEEPS, Target, TargetFailure, described
 from mirotwin.fuzz.wired import WiredMachine
 from mirotwin.shell.firmware_image import is_up, load_firmware
-from mirotwin.shell.part_files import bring_parts
+from mirotwin.shell.plugin_files import PluginFiles
 from mirotwin.verify.checks.expect import checks_of_table
 from mirotwin.verify.checks.interface import Check, Failure, Monitor, Subject, at, checked_monitor
 from mirotwin.verify.checks.serial import Character, SerialMonitor
@@ -352,7 +352,7 @@ def wired_target(spec: TargetSpec) -> BoardTarget:
     tables, steps, boot_ms, parts = (
         spec.parameters.get(key) for key in ("tables", "steps", "boot_ms", "parts")
     )
-    bring_parts(parts or ())
+    PluginFiles(parts=parts or ()).bring()
     as_settings(spec.expected)  # checks in files are known by their names from here on
     scenario = board_of_tables(dict(tables or {}), "").scenario
     image = load_firmware(spec.image, CHIPS[scenario.board.chip].flash_bytes, named=False)

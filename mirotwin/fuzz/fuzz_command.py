@@ -47,7 +47,7 @@ from mirotwin.shell.debug_files import SourceFolders, source_folders
 from mirotwin.shell.firmware_image import image_for, load_firmware
 from mirotwin.shell.options import FIRMWARE, FORCE, JOBS, NAME, OUT, PATH, QUIET, SEED, SET, SLOT, Whole
 from mirotwin.shell.options import Engine as EngineOption
-from mirotwin.shell.part_files import PART, bring_parts
+from mirotwin.shell.plugin_files import PART, PluginFiles
 from mirotwin.shell.processes import cores
 from mirotwin.shell.program import Terminated, complain, show_line
 from mirotwin.shell.progress import ProgressBar
@@ -247,7 +247,7 @@ def _fuzz_board(options: FuzzOptions) -> int:
     source = str(options.image)
     if given := options.given(*_NOT_FOR_BOARDS):
         raise click.UsageError(f"{given[0]} is not for a board with parts, which {source} is.")
-    bring_parts(options.parts)
+    PluginFiles(parts=options.parts).bring()
     lasts = (f"duration_s={BOARD_S}",) if is_board(source) else ()
     text = load_any(source, (*options.settings, *lasts, *as_settings(options.expected)))
     if not isinstance(text, BoardText):
@@ -375,7 +375,7 @@ def _run(campaign: Campaign, time_s: float, options: FuzzOptions) -> int:
             with suppress(BadInput, PluginError):
                 left = campaign.finish(INTERRUPTED_S)
     own = in_files(options.expected)
-    code = _report(Results(campaign, left, stopped is None, own, options.parts), quiet)
+    code = _report(Results(campaign, left, stopped is None, own, PluginFiles(parts=options.parts)), quiet)
     if stopped is not None:
         raise stopped
     return code

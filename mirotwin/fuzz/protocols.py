@@ -46,8 +46,7 @@ def _installed(text: str) -> tuple[type[Protocol], str, str]:
     try:
         return PROTOCOLS.find(name), name, parameters
     except PluginError as error:
-        own = ", or one of your own as FILE.py:CLASS" if error.what.endswith("one of the choices") else ""
-        raise BadInput("", OPTION, error.what, error.remedy + own) from error
+        raise BadInput("", OPTION, error.what, error.remedy) from error
 
 
 def _class_in_file(text: str) -> tuple[type[Protocol], str, str] | None:

@@ -15,6 +15,7 @@ from mirotwin.firmware.coverage_files import table, write
 from mirotwin.fuzz.campaign import Campaign
 from mirotwin.fuzz.triage import UNCONFIRMED, Crash
 from mirotwin.shell.json_text import json_bytes
+from mirotwin.shell.plugin_files import NO_FILES, PluginFiles
 from mirotwin.shell.verdicts import Verdict
 from mirotwin.verify.cases.replay_line import debug_line, foreign_path, replay_line
 
@@ -25,7 +26,7 @@ SUMMARY = "summary.json"
 class Results:
     """Of a campaign that is over. `left`: inputs that were not looked at; `complete`: it came to the end of its time.
 
-    `in_files`: the checks of --expect that are in a file, by their name, as FILE.py:CLASS; `parts`: those of --part.
+    `in_files`: the checks of --expect that are in a file, by their name, as FILE.py:CLASS; `plugins`: parts of --part.
     """
 
     def __init__(
@@ -34,13 +35,13 @@ class Results:
         left: int,
         complete: bool,
         in_files: Mapping[str, str],
-        parts: tuple[str, ...] = (),
+        plugins: PluginFiles = NO_FILES,
     ) -> None:
         self.campaign = campaign
         self.left = left
         self.complete = complete
         self.in_files = in_files
-        self.parts = parts
+        self.plugins = plugins
         self.triage = campaign.triage
         self.out = campaign.triage.folder.path
         self.progress = campaign.progress()
@@ -98,7 +99,7 @@ class Results:
         reached_by, covering = self.campaign.reached_by, self.campaign.covering
         if reached_by is not None and covering is not None:
             yield f"--covering {covering.name}: reached by {reached_by}"
-            yield f"    {replay_line(reached_by, foreign_path(triage.target.image), parts=self.parts)}"
+            yield f"    {replay_line(reached_by, foreign_path(triage.target.image), plugins=self.plugins)}"
 
     def write(self) -> None:
         """The files of the campaign. Raises OutputError."""
@@ -124,8 +125,8 @@ class Results:
         expected = (self.in_files[crash.check],) if crash.check in self.in_files else ()
         stream = self.out / crash.folder / f"{crash.name}.stream"
         image = foreign_path(self.triage.target.image)
-        yield f"    {replay_line(stream, image, expected, self.parts)}"
-        yield f"    {debug_line(stream, image, expected=expected, parts=self.parts)}"
+        yield f"    {replay_line(stream, image, expected, self.plugins)}"
+        yield f"    {debug_line(stream, image, expected=expected, plugins=self.plugins)}"
 
     def _summary(self) -> dict[str, Any]:
         campaign, progress, tracefile = self.campaign, self.progress, self.coverage.tracefile

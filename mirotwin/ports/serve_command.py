@@ -35,7 +35,7 @@ from mirotwin.shell.options import (
     refuse_steps,
 )
 from mirotwin.shell.outputs import FILES, KEPT, RECORDING, OutputFolder
-from mirotwin.shell.part_files import Parts, bring_parts
+from mirotwin.shell.plugin_files import PluginFiles
 from mirotwin.shell.program import complain, show_line, tell_notes
 from mirotwin.shell.progress import ProgressBar
 from mirotwin.shell.times import Time, TimeType
@@ -69,7 +69,7 @@ class ServeOptions(Options, frozen=True, kw_only=True):
     settings: Settings = ()
     expected: Expected = ()
     firmware: Firmware = None
-    parts: Parts = ()
+    plugins: PluginFiles = PluginFiles()
     engine: Engine = None
     quiet: Annotated[bool, QUIET.saying("Do not tell who comes and goes, and how late the world is.")] = False
 
@@ -91,7 +91,7 @@ def serve(options: ServeOptions) -> int:
     Exit code 1: a check failed; 3: the firmware did what it must not.
     """
     seed = options.seed
-    bring_parts(options.parts)
+    options.plugins.bring()
     own, text = _texts(options)
     expected = expectations_in(own)
     tell_notes(text.notes)

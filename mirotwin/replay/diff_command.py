@@ -44,7 +44,7 @@ from mirotwin.shell.options import (
     refuse_steps,
 )
 from mirotwin.shell.outputs import RECORDINGS, file_in
-from mirotwin.shell.part_files import Parts, bring_parts
+from mirotwin.shell.plugin_files import PluginFiles
 from mirotwin.shell.program import complain, tell_notes
 from mirotwin.shell.progress import ProgressBar
 from mirotwin.shell.verdicts import DONE, exit_code
@@ -73,7 +73,7 @@ class DiffOptions(Options, frozen=True, kw_only=True):
     compare: CompareOptions = CompareOptions()
     lines_from: LinesFrom = ()
     sources: SourceFolders = ()
-    parts: Parts = ()
+    plugins: PluginFiles = PluginFiles()
     engine: Engine = None
     everything: Annotated[bool, ALL.saying("List every difference, not only the first of each channel.")] = (
         False
@@ -102,7 +102,7 @@ def diff(options: DiffOptions) -> int:
         remedy = "`mirotwin replay` compares a recording made at a port with its twin"
         raise BadInput("", "--compare answers", "is for robots at a port, beside their twin", remedy)
     sources = checked_sources(options.sources)
-    bring_parts(options.parts)
+    options.plugins.bring()
     first, other = _run_images(options) if _are_images(options) else _read_recordings(options)
     first, other = _with_same_robots(first, other)
     (spec, *_), (other_spec, *_) = first.ways, other.ways
@@ -187,7 +187,7 @@ def _run_images(options: DiffOptions) -> tuple[ComparedRun, ComparedRun]:
         if job.alone:
             options.compare.refuse_of_robots(on)
     else:
-        text = load_any(on, options.settings)
+        text = load_any(on, (*options.plugins.settings(options.settings), *options.settings))
         tell_notes(text.notes)
         refuse_steps(text.scenario, text.origin)
         if isinstance(text, BoardText):

@@ -27,7 +27,6 @@ from mirotwin.shell.debug_files import LinesFrom, SourceFolders, checked_sources
 from mirotwin.shell.json_text import print_json
 from mirotwin.shell.options import ALL, FORCE, OUT, QUIET, SEED, SET, Engine, StackFrom
 from mirotwin.shell.outputs import RECORDING, RECORDINGS, OutputFolder, file_in
-from mirotwin.shell.part_files import bring_parts
 from mirotwin.shell.program import complain
 from mirotwin.shell.progress import ProgressBar
 from mirotwin.shell.verdicts import DONE, exit_code
@@ -109,7 +108,7 @@ def replay(options: ReplayOptions) -> int:
     if not options.desk.port and (given := options.given("out", "force")):
         raise click.UsageError(f"{given[0]} needs --port.")
     file = file_in(options.file, (*RECORDINGS, *CASES))
-    bring_parts(options.parts)
+    options.plugins.bring()
     job, images = _loaded(file, options)
     if options.desk.port:
         job = _sent_to_port(job, options)
@@ -131,7 +130,9 @@ def _replay_case(job: Job, options: ReplayOptions) -> int:
     with ProgressBar("replaying", job.end_tick, options.quiet) as bar:
         result = job.judge_case(bar.to)
     own_files = tuple(in_files(options.expected).values())
-    line = debug_line(job.spec.origin, foreign_path(job.spec.image), expected=own_files, parts=options.parts)
+    line = debug_line(
+        job.spec.origin, foreign_path(job.spec.image), expected=own_files, plugins=options.plugins
+    )
     return _report_case(result, line, options.quiet)
 
 
@@ -197,7 +198,7 @@ def _compare_with_recorded(job: Job, images: Sequence[Image], options: ReplayOpt
     complain(*difference_lines(difference, "the replay differs"), *difference.notes)
     if difference.differences and options.shows:
         first_tick = difference.differences[0].tick
-        show(debug_line(job.spec.origin, options.firmware, first_tick, parts=options.parts))
+        show(debug_line(job.spec.origin, options.firmware, first_tick, plugins=options.plugins))
     elif ended and not difference.differences:
         complain(f"the replay ended after {len(again.periods)} of {len(recorded)} recorded control periods")
     elif recorded and not difference.differences and not compare.as_json:

@@ -28,7 +28,7 @@ from mirotwin.shell.command import Argument, Option, Options, command_of
 from mirotwin.shell.console import show
 from mirotwin.shell.options import FIRMWARE, FORCE, NAME, NETWORK, OUT, QUIET, Engine
 from mirotwin.shell.outputs import check_new, whole_file
-from mirotwin.shell.part_files import Parts, bring_parts
+from mirotwin.shell.plugin_files import PluginFiles
 from mirotwin.shell.program import complain
 from mirotwin.shell.progress import ProgressBar
 from mirotwin.shell.verdicts import BAD_INPUT, DONE
@@ -124,7 +124,7 @@ class ExportOptions(Options, frozen=True, kw_only=True):
     ] = None
     format: Annotated[str | None, FORMAT.saying(FORMAT.help, type=click.Choice(TIMED))] = None
     network: Annotated[int | None, NETWORK.saying("Only this network. Default: all.")] = None
-    parts: Parts = ()
+    plugins: PluginFiles = PluginFiles()
     force: Annotated[bool, FORCE] = False
     quiet: Annotated[bool, QUIET.saying("No progress bar and no closing line.")] = False
     engine: Engine = None
@@ -253,7 +253,7 @@ def no_times(given: Input, format: str) -> BadInput:
 
 
 def _board(options: ExportOptions) -> Job:
-    bring_parts(options.parts)
+    options.plugins.bring()
     job = load_job(options.file, options.firmware)
     complain(*job.notes)
     if isinstance(job.spec.scenario, BoardScenario):
@@ -263,7 +263,7 @@ def _board(options: ExportOptions) -> Job:
 
 def export_board(options: ExportOptions) -> int:
     """Writes a run of a board as a stream file; returns the exit code. Raises BadInput."""
-    bring_parts(options.parts)
+    options.plugins.bring()
     job = load_job(options.file, options.firmware)
     complain(*job.notes)
     _write(options.out, [board_stream(job).encode()])

@@ -30,7 +30,7 @@ from mirotwin.shell.command import Argument, Option, Options, command_of
 from mirotwin.shell.debug_files import SourceFolders, checked_sources, source_folders
 from mirotwin.shell.options import FIRMWARE, FORCE, FROM, NAME, OUT, QUIET, TO, Engine
 from mirotwin.shell.outputs import RECORDING, RECORDINGS, file_in
-from mirotwin.shell.part_files import Parts, bring_parts
+from mirotwin.shell.plugin_files import PluginFiles
 from mirotwin.shell.program import complain
 from mirotwin.shell.times import Time, window
 from mirotwin.verify.cases.artifacts import CASES, PAGE, REPORT
@@ -59,7 +59,7 @@ class ReportOptions(Options, frozen=True, kw_only=True):
         ),
     ] = None
     sources: SourceFolders = ()
-    parts: Parts = ()
+    plugins: PluginFiles = PluginFiles()
     force: Annotated[bool, FORCE] = False
     quiet: Annotated[bool, QUIET] = False
     engine: Engine = None
@@ -94,7 +94,7 @@ def report(options: ReportOptions) -> int:
             remedy = f"`mirotwin campaign page {file}` makes its page"
             raise BadInput(file, "", "holds the results of a campaign", remedy)
     checked_sources(options.sources)
-    bring_parts(options.parts)
+    options.plugins.bring()
     made = (
         page_of(options) if other is None else pair_page(*(_side(options, file) for file in (subject, other)))
     )

@@ -24,7 +24,7 @@ from mirotwin.shell.console import plain_table
 from mirotwin.shell.console import show as print_result
 from mirotwin.shell.json_text import print_json
 from mirotwin.shell.options import JSON
-from mirotwin.shell.part_files import Parts, bring_parts
+from mirotwin.shell.plugin_files import Parts, PluginFiles
 
 KINDS = {IN: "input", STRONG: "output", OPEN_DRAIN: "open drain", TWO_WAY: "input and output"}
 
@@ -94,7 +94,7 @@ def show(options: ShowOptions) -> None:
 
     NAME may be a board file, too, which is checked.
     """
-    bring_parts(options.parts)
+    PluginFiles(parts=options.parts).bring()
     name = options.name
     if name in builtin_boards() or is_path(name):
         board = load_board(name)

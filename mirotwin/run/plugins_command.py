@@ -28,6 +28,7 @@ from mirotwin.shell.console import show as print_result
 from mirotwin.shell.info_command import version_of
 from mirotwin.shell.json_text import print_json
 from mirotwin.shell.options import JSON
+from mirotwin.shell.plugin_files import PluginFiles
 from mirotwin.verify.checks.expect import CHECKS
 
 CAMERAS = {str(struct.__struct_config__.tag): struct for struct in get_args(Camera)}
@@ -71,6 +72,7 @@ class Plugin(msgspec.Struct):
 class PluginsOptions(Options, frozen=True, kw_only=True):
     COMMAND = "plugins"
     kinds: Annotated[tuple[str, ...], Argument("[KIND..]", click.Choice(tuple(BY_KIND)), several=True)] = ()
+    files: PluginFiles = PluginFiles()
     as_json: Annotated[bool, JSON] = False
 
 
@@ -81,6 +83,7 @@ def plugins(options: PluginsOptions) -> None:
     With KIND also the keys of each: what it takes, and its default. One with a * is the key that a bare value is for.
     Where a plug-in comes from is its distribution and its file.
     """
+    options.files.bring()
     chosen = list(dict.fromkeys(options.kinds or BY_KIND))
     listed = {kind: list(plugins_of(kind)) for kind in chosen}
     if options.as_json:

@@ -25,7 +25,6 @@ from mirotwin.shell.firmware_image import image_for
 from mirotwin.shell.held_signals import held_signals
 from mirotwin.shell.options import plain_parameters
 from mirotwin.shell.outputs import FILES, OutputFolder
-from mirotwin.shell.part_files import bring_parts
 from mirotwin.shell.program import complain, tell_notes
 from mirotwin.shell.progress import ProgressBar
 from mirotwin.verify.checks.expect import expectations_in
@@ -65,9 +64,10 @@ def run(options: RunOptions) -> int:
     not.
     """
     seed, record = options.seed, options.record
-    bring_parts(options.parts)
+    options.plugins.bring()
+    settings = (*options.plugins.settings(options.settings), *options.settings)
     text = load_any(
-        options.scenario, (*options.settings, *_duration(options), *as_settings(options.expected))
+        options.scenario, (*settings, *_duration(options, settings), *as_settings(options.expected))
     )
     alone = isinstance(text, BoardText)
     if alone and (given := options.given("frames", "record_frames", "record")):
@@ -139,14 +139,14 @@ def run(options: RunOptions) -> int:
     return result.code
 
 
-def _duration(options: RunOptions) -> tuple[str, ...]:
+def _duration(options: RunOptions, settings: tuple[str, ...]) -> tuple[str, ...]:
     """The setting of --for."""
     time = options.for_time
     if time is None:
         return ()
     clock = TICKS_PER_SECOND
     if time.in_ticks:  # of the crystal, which the scenario says
-        clock = load_any(options.scenario, (*options.settings, "duration_s=1")).scenario.clock
+        clock = load_any(options.scenario, (*settings, "duration_s=1")).scenario.clock
     return (f"duration_s={time.seconds(clock)!r}",)
 
 

@@ -23,7 +23,7 @@ from mirotwin.shell.options import (
     Seed,
     StackFrom,
 )
-from mirotwin.shell.part_files import Parts
+from mirotwin.shell.plugin_files import PluginFiles
 from mirotwin.shell.times import Time, TimeType
 from mirotwin.verify.expectations import Expected
 
@@ -44,7 +44,7 @@ class RunOptions(Options, frozen=True, kw_only=True):
     expected: Expected = ()
     firmware: Firmware = None
     stack_from: StackFrom = None
-    parts: Parts = ()
+    plugins: PluginFiles = PluginFiles()
     engine: Engine = None
     record: Annotated[
         Literal["default", "full"],

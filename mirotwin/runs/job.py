@@ -27,6 +27,7 @@ from miro_sim.scenario.board_scenario import AnyText, any_of_text, board_of_tabl
 from miro_sim.scenario.errors import ScenarioError
 from miro_sim.scenario.file import builtin_names, changed, load, of_table
 from miro_sim.scenario.keys import MAX_NETWORKS, NetworkSpec, Scenario
+from miro_sim.scenario.plugins import REGISTRIES
 from miro_sim.scenario.settings import EXPECT, blamed, in_text, make
 from miro_sim.world.machine import no_network
 from mirotwin.recording.capture.detect import detect
@@ -47,7 +48,7 @@ from mirotwin.runs.board_case import (
 from mirotwin.runs.result import Result, expectation_lines, result_of_case
 from mirotwin.runs.run import Run, replaying
 from mirotwin.runs.spec import RunSpec
-from mirotwin.shell.command import command_line, operand
+from mirotwin.shell.command import command_line, operand, shell_line
 from mirotwin.shell.firmware_image import load_firmware
 from mirotwin.shell.options import plain_parameters
 from mirotwin.shell.outputs import RECORDING
@@ -316,6 +317,7 @@ def _image_for(given: stream.StreamFile, firmware: str | Path | None, stack_from
 def recorded_spec(recording: Recording, path: str, image: Image | None = None) -> RunSpec:
     """Sends again what the recorded hosts sent, on `image` (None: the recorded one). Raises BadInput."""
     source = recording.source
+    _check_brought(source.plugins, path)
     with BadInput.at(f"{path}: {SCENARIO_ATTACHMENT}"):
         scenario = _with_bits(any_of_text(source.scenario_text, "").scenario, source)
     return RunSpec(
@@ -326,6 +328,19 @@ def recorded_spec(recording: Recording, path: str, image: Image | None = None) -
         resumed=source.resumed,
         origin=path,
     )
+
+
+_BROUGHT = re.compile(r"(\w+) (.+?): (.+\.py:\w+), sources \w+", re.DOTALL)
+"""A plug-in that the command line brought in a file, as a recording names it."""
+
+
+def _check_brought(recorded: Iterable[str], path: str) -> None:
+    """Raises BadInput for a plug-in that the command line brought to the run, and not to this one."""
+    registries = {registry.word: registry for registry in REGISTRIES.values()}
+    for kind, name, file in (match.groups() for text in recorded if (match := _BROUGHT.fullmatch(text))):
+        if kind in registries and name not in registries[kind].names():
+            reason = f"its run used the {kind} {name!r} of a file, which is not here by itself"
+            raise BadInput(path, "", reason, f"give --{kind} {shell_line(file)}, the same file")
 
 
 def _with_bits(scenario: Scenario | BoardScenario, source: RunSource) -> Scenario | BoardScenario:

@@ -25,7 +25,7 @@ from mirotwin.shell.command import shell_line
 from mirotwin.shell.outputs import RECORDING
 from mirotwin.testing.rig import Rig
 from mirotwin.testing.rig_options import rig_options
-from mirotwin.testing.session_options import desk_of, path_option
+from mirotwin.testing.session_options import FILES_OF, desk_of, path_option
 from mirotwin.testing.waiting import WaitFailed
 from mirotwin.verify.cases.artifacts import clear, leave, nothing_left, report_line
 
@@ -168,8 +168,9 @@ def test_line(item: pytest.Item, seed: int) -> str:
     words = ["pytest", f"{file}::{name}", "--mirotwin-seed", str(seed)]
     if (firmware := path_option(item.config, "firmware")) is not None:
         words += ["--mirotwin-firmware", _relative(item.config, firmware)]
-    for part in item.config.getoption("--mirotwin-part"):
-        words += ["--mirotwin-part", part]
+    for kind in FILES_OF:
+        for one in item.config.getoption(f"--mirotwin-{kind}"):
+            words += [f"--mirotwin-{kind}", one]
     for option in ("--mirotwin-port", "--mirotwin-allow-motion", "--mirotwin-max-speed"):
         if value := item.config.getoption(option):
             words += [option] if value is True else [option, f"{value}"]

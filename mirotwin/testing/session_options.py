@@ -23,6 +23,8 @@ _OPTIONS: tuple[tuple[str, str, type, str], ...] = (
     ("--mirotwin-artifacts", "DIR", str, _INI["mirotwin_artifacts"]),
     ("--mirotwin-repeat", "N", int, _INI["mirotwin_repeat"]),
     ("--mirotwin-part", "FILE.py:CLASS", list, "a part of your own that boards name"),
+    ("--mirotwin-law", "FILE.py:CLASS", list, "a law of your own that scenarios name"),
+    ("--mirotwin-estimator", "FILE.py:CLASS", list, "an estimator of your own that scenarios name"),
     ("--mirotwin-pages", "", bool, "make the page of each failed test, too: some seconds each"),
     ("--mirotwin-port", "URL", str, "run against the robots at this port, not against their twin"),
     ("--mirotwin-allow-motion", "", bool, "with a port: send what moves a robot"),
@@ -38,6 +40,10 @@ _OPTIONS: tuple[tuple[str, str, type, str], ...] = (
     ("--firmware-coverage-fail-under", "PERCENT", float, "fail when fewer of the lines ran"),
 )
 """Name, what stands for its value in the help, type (bool: a switch; list: may be repeated), help."""
+
+
+FILES_OF = ("part", "law", "estimator")
+"""Kinds of plug-ins that the command line brings in files, by `--mirotwin-KIND`."""
 
 
 def add_options(parser: pytest.Parser) -> None:
@@ -75,11 +81,14 @@ def check_options(config: pytest.Config) -> None:
             load_firmware(firmware)
         except ValueError as error:
             raise pytest.UsageError(f"--mirotwin-firmware: {error}") from None
-    if parts := config.getoption("--mirotwin-part"):
-        from mirotwin.shell.part_files import bring_parts
+    given = {f"{kind}s": config.getoption(f"--mirotwin-{kind}") for kind in FILES_OF}
+    if any(given.values()):
+        from mirotwin.shell.plugin_files import PluginFiles
 
+        here = config.invocation_params.dir
+        files = {field: tuple(f"{Path(here, one)}" for one in listed) for field, listed in given.items()}
         try:
-            bring_parts([f"{Path(config.invocation_params.dir, part)}" for part in parts], "--mirotwin-part")
+            PluginFiles(**files).bring("--mirotwin-")
         except ValueError as error:
             raise pytest.UsageError(f"{error}") from None
     workers = config.getoption("numprocesses", None) or 0

@@ -14,7 +14,6 @@ from mirotwin.runs.test_file import KINDS, collect, stem_of
 from mirotwin.shell.command import command_of
 from mirotwin.shell.junit import TestCase, junit_xml
 from mirotwin.shell.outputs import check_file, whole_file
-from mirotwin.shell.part_files import bring_parts
 from mirotwin.shell.program import show_line, show_traceback, tell_notes
 from mirotwin.shell.verdicts import VERDICTS, exit_code
 from mirotwin.testing.test_files import run_file
@@ -42,7 +41,7 @@ def test(options: TestOptions) -> int:
     because a port, or an image without symbols, shows none of it.
     """
     word, junit, desk = options.word, options.junit, options.desk
-    bring_parts(options.parts)
+    options.plugins.bring()
     files = collect(options.paths)
     chosen = [file for file in files if word.lower() in file.lower()]
     if not chosen:

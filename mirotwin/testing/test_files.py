@@ -34,7 +34,11 @@ def _run_scenario(options: TestOptions, file: str) -> Result:
     again = partial(options.line_for, file)
     if options.firmware is not None:  # an image that no file can run on ends the command
         load_firmware(options.firmware, SPACE_BYTES)
-    settings = (*options.settings, *as_settings(options.expected))
+    settings = (
+        *options.plugins.settings(options.settings),
+        *options.settings,
+        *as_settings(options.expected),
+    )
     result = run_test(file, options.firmware, options.seed, settings, options.artifacts, again, options.desk)
     return replace(result, again=result.again or again())
 
@@ -49,7 +53,7 @@ def _run_case(options: TestOptions, path: str) -> Result:
         result = _as_test(path, job.judge_case())
     except BadInput as error:
         result = cannot_be_run(path, error)
-    return replace(result, again=replay_line(path, options.firmware, tuple(expected), options.parts))
+    return replace(result, again=replay_line(path, options.firmware, tuple(expected), options.plugins))
 
 
 def _as_test(path: str, result: Result) -> Result:

@@ -8,7 +8,7 @@ from typing import Annotated
 from mirotwin.desk.guard import DeskOptions
 from mirotwin.shell.command import Argument, Option, Options
 from mirotwin.shell.options import ARTIFACTS, JUNIT, NAME, QUIET, SET, Engine, Firmware, Seed
-from mirotwin.shell.part_files import Parts
+from mirotwin.shell.plugin_files import PluginFiles
 from mirotwin.verify.expectations import Expected
 
 
@@ -23,7 +23,7 @@ class TestOptions(Options, frozen=True, kw_only=True):
     ] = ()
     expected: Expected = ()
     firmware: Firmware = None
-    parts: Parts = ()
+    plugins: PluginFiles = PluginFiles()
     engine: Engine = None
     junit: Annotated[Path | None, JUNIT.saying("Write the verdicts as JUnit XML, too.")] = None
     artifacts: Annotated[
@@ -46,7 +46,7 @@ class TestOptions(Options, frozen=True, kw_only=True):
             settings=self.settings,
             expected=self.expected,
             firmware=self.firmware,
-            parts=self.parts,
+            plugins=self.plugins,
             artifacts=self.artifacts if saves else None,
             desk=self.desk,
         )

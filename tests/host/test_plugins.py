@@ -112,7 +112,7 @@ def test_a_scenario_that_uses_the_ambiguous_law_by_default_says_where(site):
 
 def test_an_unknown_name_gets_the_nearest_and_the_list(site):
     install(site, "steady-law", "1.2", {"steady": "plug_steady:Parameters"}, plug_steady=GOOD)
-    choices = use_one_of([*OWN, "steady"])
+    choices = f"{use_one_of([*OWN, 'steady'])}, or one of your own: --law FILE.py:CLASS"
     assert reason("stedy") == f"'stedy' is not one of the choices; did you mean steady? {choices}"
     assert reason("pid") == f"'pid' is not one of the choices; {choices}"
 

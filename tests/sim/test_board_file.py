@@ -22,7 +22,7 @@ from miro_sim.scenario.board import BoardScenario
 from miro_sim.scenario.board_file import board_of_table, builtin_boards, load_board, table_of
 from miro_sim.scenario.parts import PARTS
 from miro_sim.scenario.plugins import plugins_used
-from mirotwin.shell.part_files import bring_parts
+from mirotwin.shell.plugin_files import PluginFiles
 from tests.exact import distribution
 from tests.example_count import examples
 
@@ -276,12 +276,12 @@ def test_a_part_of_the_command_line_is_found_until_the_option_is_read_again(tmp_
     path = tmp_path / "sonar.py"
     path.write_text(SONAR)
     text = HEAD + '[parts.eye]\npart = "sonar"\npins = { echo = "P1.0" }\n'
-    bring_parts([f"{path}:Sonar"])
+    PluginFiles(parts=(f"{path}:Sonar",)).bring()
     try:
         (used,) = plugins_used(BoardScenario(board=board(text)), installed.described_once)
         assert used.startswith("part sonar: sonar.py:Sonar, sources ")
     finally:
-        bring_parts([])
+        PluginFiles().bring()
     assert "'sonar' is not one of the choices" in line(text)
 
 
@@ -290,12 +290,12 @@ def test_annotations_of_a_file_in_python_may_wait_until_they_are_needed(tmp_path
     path = tmp_path / f"{name}.py"
     head = "from __future__ import annotations\nfrom typing import Annotated\nfrom msgspec import Meta\n"
     path.write_text(head + SONAR.replace("cm: float", "cm: Annotated[float, Meta(le=9)]"))
-    bring_parts([f"{path}:Sonar"])
+    PluginFiles(parts=(f"{path}:Sonar",)).bring()
     try:
         message = line(HEAD + '[parts.eye]\npart = "sonar"\ncm = 10\npins = { echo = "P1.0" }\n')
         assert message.startswith("parts.eye.cm: 10 is out of range; must be <= 9.0")
     finally:
-        bring_parts([])
+        PluginFiles().bring()
     assert sys.modules["json"] is json
 
 
@@ -318,7 +318,7 @@ def test_a_part_that_cannot_be_used_is_one_line_with_its_file(tmp_path, source, 
     path = tmp_path / "sonar.py"
     path.write_text(source)
     with pytest.raises(BadInput, match=r"sonar\.py: --part") as refused:
-        bring_parts([f"{path}:{option}"])
+        PluginFiles(parts=(f"{path}:{option}",)).bring()
     assert message in f"{refused.value}"
     assert "\n" not in f"{refused.value}"
     assert not PARTS.in_files

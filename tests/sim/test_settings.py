@@ -266,12 +266,10 @@ def test_any_law_takes_the_place_of_any_other(law):
 @pytest.mark.parametrize(
     "setting",
     [
-        "law=body_frame",
         "controller.law=body_frame",
         "controller=body_frame",
         "robot.controller.law=body_frame",
         "estimator.kind=ekf",
-        "estimator=ekf",
         "camera=gaussian",
         "network.0.controller.law=kanayama",
         "network.0.robot.0.law=kanayama",
@@ -284,6 +282,27 @@ def test_what_an_error_advises_to_write_is_accepted(source, setting):
     advised = caught.value.remedy.removeprefix("write --set ")
     assert advised != caught.value.remedy
     load(source, [advised])
+
+
+@pytest.mark.parametrize("source", ["fig6", str(TWO_TEAMS)])
+def test_a_law_and_an_estimator_may_be_those_of_all_robots(source):
+    made = load(source, ["law=kanayama", "estimator=predict"]).scenario
+    robots = [robot for network in made.networks for robot in network.robot]
+    assert {robot.controller.name() for robot in robots} == {"kanayama"}
+    assert {robot.estimator.name() for robot in robots} == {"predict"}
+
+
+def test_a_law_of_all_robots_leaves_those_alone_where_one_has_it():
+    first = "network.0.robot.0.controller.law=kanayama"
+    made = load(str(TWO_TEAMS), [first, "law=kanayama"]).scenario
+    assert made == load(str(TWO_TEAMS), [first]).scenario
+    assert made != load(str(TWO_TEAMS), ["law=kanayama"]).scenario
+
+
+def test_a_law_of_all_robots_that_there_is_not_names_the_setting():
+    said = refusal("law=nolaw", source=str(TWO_TEAMS))
+    assert "--set law=nolaw: " in said
+    assert "'nolaw' is not one of the choices" in said
 
 
 def test_the_advice_keeps_the_network_and_the_robot_that_were_named():

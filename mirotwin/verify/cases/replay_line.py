@@ -10,7 +10,7 @@ from miro_robot.firmware import image_path
 from miro_robot.image import Image
 from mirotwin.shell.command import Argument, Option, Options
 from mirotwin.shell.options import FIRMWARE, NAME
-from mirotwin.shell.part_files import Parts
+from mirotwin.shell.plugin_files import NO_FILES, PluginFiles
 from mirotwin.verify.expectations import Expected
 
 
@@ -24,7 +24,7 @@ class CaseOptions(Options, frozen=True, kw_only=True):
         FIRMWARE.saying("Image to run instead of the recorded one (of the robot's own, for a text stream)."),
     ] = None
     expected: Expected = ()
-    parts: Parts = ()
+    plugins: PluginFiles = PluginFiles()
 
 
 class DebugLineOptions(CaseOptions, frozen=True, kw_only=True):
@@ -39,12 +39,12 @@ def debug_line(
     firmware: str | PathLike[str] | None = None,
     at_tick: int | None = None,
     expected: tuple[str, ...] = (),
-    parts: tuple[str, ...] = (),
+    plugins: PluginFiles = NO_FILES,
 ) -> str:
     """The command that stands at the failed check of a case, or at a tick of a recording, to go back from there."""
     image, place = None if firmware is None else f"{firmware}", "" if at_tick is None else f"{at_tick}t"
     return DebugLineOptions(
-        file=f"{file}", firmware=image, at=place, expected=expected, parts=parts
+        file=f"{file}", firmware=image, at=place, expected=expected, plugins=plugins
     ).command_line()
 
 
@@ -52,14 +52,14 @@ def replay_line(
     stream: str | PathLike[str],
     firmware: str | PathLike[str] | None = None,
     expected: tuple[str, ...] = (),
-    parts: tuple[str, ...] = (),
+    plugins: PluginFiles = NO_FILES,
 ) -> str:
     """The command that plays a stream or a case again, on that image (None: the robot's own).
 
-    `expected`, `parts`: checks and parts in files, FILE.py:CLASS, which a case cannot name.
+    `expected`, `plugins`: checks and others in files, FILE.py:CLASS, which a case cannot name.
     """
     image = None if firmware is None else f"{firmware}"
-    return CaseOptions(file=f"{stream}", firmware=image, expected=expected, parts=parts).command_line()
+    return CaseOptions(file=f"{stream}", firmware=image, expected=expected, plugins=plugins).command_line()
 
 
 def foreign_path(image: Image) -> Path | None:

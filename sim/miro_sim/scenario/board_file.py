@@ -233,10 +233,7 @@ def _part(name: str, table: dict[str, Any]) -> PartSpec:
             struct = PARTS.find(kind)
             check_struct(struct)
         except PluginError as error:
-            remedy = error.remedy
-            if error.what.endswith("one of the choices"):
-                remedy += ", or your own, with a command that takes --part FILE.py:CLASS"
-            raise BoardError("", "part", error.what, remedy) from error
+            raise BoardError("", "part", error.what, error.remedy) from error
         own = {key: value for key, value in table.items() if key != "pins"}
         with BoardError.at("", "pins"):
             pins = struct_of(table.get("pins", {}), dict[str, str])

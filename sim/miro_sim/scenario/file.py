@@ -166,7 +166,9 @@ def _checked(
     while True:
         try:
             scenario = _converted(raw, origin)
-            notes = tuple(f"{path} leaves out {', '.join(keys)}" for path, keys in dropped.items())
+            notes = tuple(
+                f"{path} leaves out {', '.join(dict.fromkeys(keys))}" for path, keys in dropped.items()
+            )
             return ScenarioText(origin, "", tuple(settings), notes, raw, tuple(made), scenario=scenario)
         except ScenarioError as error:
             found = drop_other_kind(error, made)

@@ -2,7 +2,8 @@
 
 KEY is the path of a key, `network.0.robot.0.controller.gamma1_per_s`. An index may be left out where a list has one
 entry: `network.robot.controller.gamma1_per_s`. VALUE is read as TOML, and as text if it is none; an inline table
-replaces a whole table. `variant=NAME` stands for all that the variant changes (`variants`).
+replaces a whole table. `variant=NAME` stands for all that the variant changes (`variants`); `law=NAME` is that of all
+robots, unless the scenario names it for one, and so are `estimator=NAME` and `reference=NAME`.
 """
 
 import json
@@ -16,9 +17,9 @@ from miro_host.registries import LAWS
 from miro_protocol.toml_text import TomlError, value_of
 from miro_sim.scenario.errors import Refused, ScenarioError
 from miro_sim.scenario.keys import NetworkSpec, RobotSpec
-from miro_sim.scenario.plugins import REGISTRIES
+from miro_sim.scenario.plugins import REGISTRIES, table_of
 from miro_sim.scenario.profiles import ERROR_KEYS
-from miro_sim.scenario.variants import impose
+from miro_sim.scenario.variants import impose, tables_in
 
 Table = dict[str, Any]
 _WORD = re.compile(r"[\w-]+")
@@ -28,6 +29,8 @@ _TAGS = {registry.key for registry in REGISTRIES.values()}
 """Keys that say which other keys a table has."""
 TABLES = {"camera": "kind", "controller": "law", "estimator": "kind", "reference": "kind"}
 """Tables of several kinds, and the key that says which."""
+_OF_ALL = {"law": "controller", "estimator": "estimator", "reference": "reference"}
+"""Settings that choose the kind of this table for all robots."""
 _DEFAULTS = {registry.default for registry in REGISTRIES.values() if registry.default}
 """What they say where they are missing."""
 
@@ -97,7 +100,27 @@ def _inline(value: Any) -> str:
 
 def make(raw: Table, settings: Iterable[str], origin: str, option: str = OPTION) -> list[Setting]:
     """Makes the settings in the tables of a scenario, in their order. Raises ScenarioError."""
-    return [_make(raw, text, origin, option) for text in settings]
+    return [
+        msgspec.structs.replace(_make(raw, text, origin, option), text=given)
+        for given in settings
+        for text in _of_all(raw, given)
+    ]
+
+
+def _of_all(raw: Table, text: str) -> list[str]:
+    """`law=NAME` as the settings of all robots, none where one of them has it; any other setting as it is."""
+    word, _, name = text.partition("=")
+    if word not in _OF_ALL:
+        return [text]
+    table, key = _OF_ALL[word], TABLES[_OF_ALL[word]]
+    robots = {
+        f"network.{network}.robot.{place}": robot
+        for network, one in enumerate(tables_in(raw, "network"))
+        for place, robot in enumerate(tables_in(one, "robot"))
+    }
+    if any(table_of(robot.get(table)).get(key) == name for robot in robots.values()):
+        return []
+    return [f"{path}.{table}.{key}={name}" for path in robots]
 
 
 def _make(raw: Table, text: str, origin: str, option: str) -> Setting:

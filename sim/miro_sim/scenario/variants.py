@@ -36,12 +36,12 @@ def impose(raw: Table, name: object) -> None:
         _take_out(raw.get("camera"), DISTURBING_CAMERA)
         raw["camera"] = {"kind": "pixels", **table_of(raw.get("camera"))}
     raw["host"] = dict(variant.get("host", {}))
-    for network in _tables(raw, "network"):
+    for network in tables_in(raw, "network"):
         radio = table_of(network.get("radio"))
         kept = {key: radio[key] for key in STAYS_IN_RADIO if key in radio}
         network["radio"] = {**kept, **variant.get("radio", {})}
         network.pop("control_noise", None)
-        for robot in _tables(network, "robot"):
+        for robot in tables_in(network, "robot"):
             _take_out(robot, ("wheel_radius_mismatch",))
             _take_out(robot.get("drive"), DISTURBING_DRIVE)
             _take_out(table_of(robot.get("drive")).get("chassis"), DISTURBING_CHASSIS)
@@ -89,7 +89,7 @@ def _take_out(table: object, keys: tuple[str, ...]) -> None:
             table.pop(key, None)
 
 
-def _tables(above: Table, key: str) -> Iterator[Table]:
+def tables_in(above: Table, key: str) -> Iterator[Table]:
     """The tables of a list of tables; what has another shape is left to whoever checks the scenario."""
     listed = above.get(key)
     return iter([table for table in listed if isinstance(table, dict)] if isinstance(listed, list) else [])

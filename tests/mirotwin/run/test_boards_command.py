@@ -68,7 +68,7 @@ def test_limits_are_shown_as_whole_numbers(mirotwin):
         (["show", "ledd"], "ledd: no such board and no such part; did you mean led?"),
         (["show", "none.board.toml"], "none.board.toml: no such file"),
         (["led"], "No such command 'led'; did you mean `boards show led`?"),
-        (["show", "led", "--part", "sonar"], "--part: 'sonar' is not FILE.py:CLASS; write it as sonar.py:Sonar"),
+        (["show", "led", "--part", "sonar"], "--part: 'sonar' is not FILE.py:CLASS; write it as my_part.py:Parameters"),
     ],
 )  # fmt: skip
 def test_what_is_neither_board_nor_part_is_one_line(mirotwin, arguments, message):

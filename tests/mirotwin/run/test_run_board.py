@@ -169,7 +169,7 @@ def test_a_part_of_ones_own_is_run_and_its_failure_ends_the_run_in_one_line(miro
     own.write_text(CLOCK)
     words = ("run", path, "--out", tmp_path / "out", "-q")
     assert re.search(
-        r"parts\.beat\.part: 'metronome' is not one of the choices; .* that takes --part FILE\.py:CLASS",
+        r"parts\.beat\.part: 'metronome' is not one of the choices; .* one of your own: --part FILE\.py:CLASS",
         mirotwin.refuses(*words),
     )
     err = mirotwin.ends(2, *words, "--part", f"{own}:Metronome")

@@ -294,7 +294,7 @@ def test_ours_by_name_with_parameters():
         ("miro:robots=4", "miro:robots=4: robots: invalid enum value 4; miro has robots"),
         ("miro:robots", "'robots' are no parameters; write NAME:KEY=VALUE,KEY=VALUE, such as miro:robots=5"),
         ("miro:rate=1", "miro:rate=1: rate: unknown key; miro has robots"),
-        ("", "'' is not one of the choices; use miro, or one of your own as FILE.py:CLASS"),
+        ("", "'' is not one of the choices; use miro, or one of your own: --protocol FILE.py:CLASS"),
     ],
 )
 def test_what_is_no_protocol_is_refused(text, said):
