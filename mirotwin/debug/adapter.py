@@ -26,7 +26,7 @@ from miro_robot.image.c_types import CType
 from miro_robot.inspect.writes import Bytes
 from miro_robot.mcs51.opcodes import SFRS
 from mirotwin.debug.board_values import GROUPS, value_on
-from mirotwin.debug.debugger import STEPPED, Breakpoint, Debugger
+from mirotwin.debug.debugger import ACCESSES, STEPPED, Breakpoint, Debugger
 from mirotwin.debug.expression import Term, Value, children, content, expression
 from mirotwin.debug.looking import REGISTERS
 from mirotwin.debug.session import Session
@@ -58,7 +58,7 @@ _QUIET = (
 _MOST_FRAMES = 1000
 _MOST_LOG, _MOST_TERMS = 4096, 32  # characters and expressions of a message
 _IN_BRACES = re.compile(r"\{([^{}]*)\}")
-_PLACE = re.compile(r"(iram|sfr|xram):([0-9]{1,5}):([0-9]{1,5})(?::([0-9]{1,20}))?")
+_PLACE = re.compile(r"(iram|sfr|xram|code):([0-9]{1,5}):([0-9]{1,5})(?::([0-9]{1,20}))?")
 _PATH = re.compile(r"(?:(\w+):)?([A-Za-z_]\w*)((?:\.\w+|\[[0-9]{1,6}\])*)")
 _REASONS = {
     "breakpoint": "breakpoint", "begin": "entry", "case": "exception", "firmware": "exception", "goto": "goto",
@@ -210,10 +210,8 @@ class Adapter:
             try:
                 where = place(item)
                 log = _logged(item["logMessage"]) if item.get("logMessage") else None
-                if item.get("accessType", "write") != "write":
-                    raise ValueError("only what is written can be stopped at")
                 if kind == "data breakpoint":
-                    made = self._watched(where, *conditions)
+                    made = self._watched(where, *conditions, item.get("accessType") or "write")
                 else:
                     made = self.its.add(where, *conditions)
             except _UNUSABLE as error:
@@ -221,7 +219,7 @@ class Adapter:
                 continue
             made.kind, made.log = kind, log
             reply: Message = {"verified": True, "id": made.number, "message": made.note or None}
-            if made.written is None:
+            if made.watched is None:
                 first = min(made.addresses)
                 line = self.symbols.line(first)
                 reply |= {
@@ -231,17 +229,19 @@ class Adapter:
             replies.append(reply)
         return {"breakpoints": replies}
 
-    def _watched(self, data: str, condition: str, count: str) -> Breakpoint:
+    def _watched(self, data: str, condition: str, count: str, access: str) -> Breakpoint:
         """A data breakpoint by its `dataId`: a name, or for what has none the place in this run."""
+        if access not in ACCESSES:
+            raise ValueError(f"{access} is no access: give {', '.join(ACCESSES)}")
         if place := _PLACE.fullmatch(data):
             value = Value(CType("int", int(place[3])), place[1], int(place[2]))
-            whole = self.its.bytes_of(data, value)
+            whole = self.its.bytes_of(data, value, read=access != "write")
             mask = -1 if place[4] is None else int(place[4])
-            return self.its.watch(data, condition, count, whole.bits(mask))
+            return self.its.watch(data, condition, count, whole.bits(mask), access)
         parts = _PATH.fullmatch(data)
         if parts is None or self._moment(None).scope_of(parts[2], parts[1] or "") is None:
             raise BadInput("", data, "is no variable of this firmware")
-        return self.its.watch(data, condition, count)
+        return self.its.watch(data, condition, count, access=access)
 
     def on_dataBreakpointInfo(self, given: Message) -> Message:
         name = given["name"]
@@ -252,7 +252,7 @@ class Adapter:
                 value, path = values[name](), _joined(path, name)
             else:
                 value, path = expression(name)(moment), name
-            written = self.its.bytes_of(name, value)
+            written = self.its.bytes_of(name, value, read=True)
         except BadInput as error:
             return {"dataId": None, "description": str(error)}
         data = self._named(path, moment, written)
@@ -262,8 +262,8 @@ class Adapter:
         data = data or f"{written.space}:{written.first}:{size}{bits}"
         return {
             "dataId": data,
-            "description": f"before {name} is written",
-            "accessTypes": ["write"],
+            "description": f"before {name} is accessed",
+            "accessTypes": ["read"] if written.space == "code" else [*ACCESSES],
             "canPersist": keeps,
         }
 
@@ -273,7 +273,7 @@ class Adapter:
         with suppress(BadInput):
             if parts is not None and (scope := moment.scope_of(parts[2], parts[1] or "")) is not None:
                 name = f"{scope}:{parts[2]}{parts[3]}" if scope else parts[2] + parts[3]
-                if self.its.bytes_of(name).same(written):
+                if self.its.bytes_of(name, read=True).same(written):
                     return name
         return ""
 

@@ -26,7 +26,8 @@ from mirotwin.debug.symbols import SIZES, Moment, Symbols
 from mirotwin.debug.timeline import Core, Hit, Position, Timeline, Trap
 
 BEGINS, INTERRUPTED, STEPPED = "the run begins here", "interrupted", "step"
-_BY_THE_WAY = {SFRS[name] for name in ("ACC", "B", "DPL", "DPH", "PSW", "SP")}
+_BY_THE_WAY = {SFRS[name] for name in ("ACC", "B", "DPL", "DPH", "PSW")}
+ACCESSES = {"write": "is written", "read": "is read", "readWrite": "is read or written"}
 _FLAGS = 0xC5  # of PSW: CY, AC, OV, P
 _COUNTS: dict[str, Callable[[int, int], bool]] = {
     "": int.__eq__, "=": int.__eq__, "==": int.__eq__, ">": int.__gt__, ">=": int.__ge__, "<": int.__lt__,
@@ -36,7 +37,7 @@ _COUNTS: dict[str, Callable[[int, int], bool]] = {
 
 class Breakpoint(msgspec.Struct, eq=False):
     """Stops, or with `log` tells something, before an instruction at one of `addresses`: where `condition` is true,
-    `written` is written, and `count` fits how often that was so since the run began.
+    `watched` is accessed as `access` says, and `count` fits how often that was so since the run began.
 
     `text`: as it was entered; `note`: a remark on its place; `kind`: an editor's, which it sets together.
     `once`: it is removed where it stops.
@@ -48,7 +49,8 @@ class Breakpoint(msgspec.Struct, eq=False):
     addresses: Collection[int]
     condition: Term | None = None
     count: Callable[[int], bool] | None = None
-    written: Bytes | None = None
+    watched: Bytes | None = None
+    access: str = "write"
     note: str = ""
     kind: str = ""
     log: Callable[[Moment], str] | None = None
@@ -127,17 +129,28 @@ class Debugger:
                     raise
 
     def watch(
-        self, text: str, condition: str = "", count: str = "", written: Bytes | None = None
+        self,
+        text: str,
+        condition: str = "",
+        count: str = "",
+        watched: Bytes | None = None,
+        access: str = "write",
     ) -> Breakpoint:
-        """A data breakpoint: before an instruction that writes `written`, or what `text` means. Raises BadInput."""
-        written = written or self.bytes_of(text)
-        return self._added(f"watch {text}", self._writers(written), condition, count, written=written)
+        """A data breakpoint: before an instruction that accesses `watched`, or what `text` means. Raises BadInput."""
+        watched = watched or self.bytes_of(text, read=access != "write")
+        addresses = set[int]()
+        if access != "read":
+            addresses |= set(self._writers(watched))
+        if access != "write":
+            addresses |= set(self._readers(watched))
+        verb = {"write": "watch", "read": "rwatch", "readWrite": "awatch"}[access]
+        return self._added(f"{verb} {text}", addresses, condition, count, watched=watched, access=access)
 
     def _added(
         self, text: str, addresses: Collection[int], condition: str, count: str, **more: Any
     ) -> Breakpoint:
         term = expression(condition, self.symbols.known) if condition else None
-        if not more.get("written"):
+        if not more.get("watched"):
             self._refuse_unknown(condition, addresses)
         counts = _counting(count) if count else None
         self._numbers += 1
@@ -145,8 +158,8 @@ class Debugger:
         self.breakpoints.append(Breakpoint(self._numbers, whole, frozenset(addresses), term, counts, **more))
         return self.breakpoints[-1]
 
-    def bytes_of(self, text: str, place: Value | None = None) -> Bytes:
-        """Where `text` lies. Raises NoValue for what lies in no memory that is written."""
+    def bytes_of(self, text: str, place: Value | None = None, read: bool = False) -> Bytes:
+        """Where `text` lies. Raises NoValue for what lies in no memory that is written, or is only `read`."""
         value = place or expression(text)(self.moment())
         space, address, size = value.space, value.address, value.kind.size if value.kind else 0
         mask = -1
@@ -155,7 +168,8 @@ class Debugger:
         if space == "bit":
             mask = 1 << (address & 7)
             space, address = "sfr" if address >= 0x80 else "iram", byte_of_bit(address)
-        if not size or space not in ("iram", "sfr", "xram") or not 0 <= address <= SIZES[space] - size:
+        memories = ("iram", "sfr", "xram", *(("code",) if read else ()))
+        if not size or space not in memories or not 0 <= address <= SIZES[space] - size:
             raise NoValue(
                 f"{text} lies in no memory that can be watched", "name a variable: `print` says what it is"
             )
@@ -167,10 +181,20 @@ class Debugger:
         """Where instructions may write it. What pushes beside the stack is a firmware fault, and not looked for."""
         if self.timeline.code_in_ram:
             return self.timeline.everywhere
-        first, last = self.symbols.image.symbols.stack
-        on_stack = written.first <= last and written.end > first
+        on_stack = self._is_on_stack(written)
         writers = written.writers(self.symbols.image.code, self.symbols.instructions, on_stack)
-        return writers | self.symbols.unwinder.vectors if written.space == "iram" and on_stack else writers
+        pushed = on_stack or (written.space, written.first) == ("sfr", SFRS["SP"])
+        return writers | self.symbols.unwinder.vectors if pushed else writers
+
+    def _readers(self, read: Bytes) -> Collection[int]:
+        """Where instructions may read it."""
+        if self.timeline.code_in_ram:
+            return self.timeline.everywhere
+        return read.readers(self.symbols.image.code, self.symbols.instructions, self._is_on_stack(read))
+
+    def _is_on_stack(self, place: Bytes) -> bool:
+        first, last = self.symbols.image.symbols.stack
+        return place.space == "iram" and place.first <= last and place.end > first
 
     def _writes(self, written: Bytes, cpu: Cpu) -> bool:
         """Whether the next instruction writes it, or the hardware's call of a routine has just done."""
@@ -179,7 +203,17 @@ class Debugger:
     def _pushed(self, written: Bytes, cpu: Cpu) -> bool:
         """Whether the hardware has just called a routine, and the return address that it pushed lies there."""
         entered = cpu.pc in self.symbols.unwinder.vectors and cpu.peripherals.interrupts.in_service
-        return bool(entered) and any(written.first <= cpu.sp - at < written.end for at in (0, 1))
+        if written.space == "sfr":
+            return bool(entered) and written.first == SFRS["SP"]
+        on_stack = any(written.first <= cpu.sp - at < written.end for at in (0, 1))
+        return bool(entered) and written.space == "iram" and on_stack
+
+    def _accesses(self, breakpoint: Breakpoint, cpu: Cpu) -> bool:
+        watched, access = breakpoint.watched, breakpoint.access
+        if watched is None:
+            return True
+        read = access != "write" and watched.are_read(cpu)
+        return read or (access != "read" and self._writes(watched, cpu))
 
     def _traps(self, step: Trap | None = None) -> dict[int, Trap]:
         """What a search asks: the breakpoints, and `step` of the processor in focus."""
@@ -201,7 +235,7 @@ class Debugger:
         return traps
 
     def _is_met(self, breakpoint: Breakpoint, core: Core) -> bool:
-        if breakpoint.written is not None and not self._writes(breakpoint.written, core.cpu):
+        if not self._accesses(breakpoint, core.cpu):
             return False
         if breakpoint.condition is None:
             return True

@@ -6,9 +6,9 @@ import re
 from collections.abc import Callable, Iterator
 from itertools import count
 
-from miro_exact.bad_input import BadInput
+from miro_exact.bad_input import BadInput, amount
 from miro_robot.image.symbol_files import read_text
-from miro_robot.inspect.frames import StackFrame
+from miro_robot.inspect.frames import RESET_SP, StackFrame
 from miro_robot.mcs51.opcodes import LENGTH, SFRS, disassemble
 from mirotwin.debug.expression import NoValue, Value, expression, number, pointed
 from mirotwin.debug.session import Examined, Session
@@ -26,11 +26,30 @@ _ROW_BYTES = {1: 8, 2: 16, 4: 16, 8: 16}
 
 
 def where(session: Session, rest: str) -> None:
-    """The functions under way; N: the innermost ones of them."""
-    frames = session.debugger.frames()
+    """The functions under way; N: the innermost ones of them. Of a stack that is out of step what is over."""
+    unwinder, cpu = session.symbols.unwinder, session.debugger.cpu
+    first, _ = session.symbols.image.symbols.stack
+    odd = unwinder.out_of_step(cpu, first - 1)
+    frames = unwinder.frames(cpu, *(odd or ()))
     if rest and not (rest.isdecimal() and int(rest[:9]) > 0):
         raise BadInput("", "where", f"{rest} is no number of frames")
     show_frames(session, frames, session.frame, int(rest[:9]) if rest else len(frames))
+    if odd is not None:
+        index, by = odd
+        top = frames[index - 1].base - 2 if index else cpu.sp
+        bytes_there = amount(abs(by), "byte")
+        where_there = (
+            f"between iram[{frames[index].base + 1:#x}] and iram[{top:#x}] that no instruction pushed there"
+        )
+        session.tell(
+            f"    the stack is out of step: frame {index} has {bytes_there} {where_there}"
+            if by > 0
+            else f"    the stack is out of step: frame {index} has {bytes_there} less than its instructions pushed"
+        )
+    elif not frames[-1].known:
+        first = first or RESET_SP + 1
+        over = amount(max(frames[-1].base - first + 1, 0), "byte")
+        session.tell(f"    {over} of the stack, from iram[{first:#x}] on, cannot be explained")
 
 
 def show_frames(session: Session, frames: list[StackFrame], chosen: int = -1, most: int = 1000) -> None:

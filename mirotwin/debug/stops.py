@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from miro_exact.bad_input import BadInput
+from mirotwin.debug.debugger import ACCESSES
 from mirotwin.debug.session import Session
 
 
@@ -24,10 +25,10 @@ def tell_all(session: Session) -> None:
         session.tell(f"{point.number}  {point.text}{once}")
 
 
-def watch(session: Session, rest: str) -> None:
+def watch(session: Session, rest: str, access: str = "write") -> None:
     name, _, condition = (part.strip() for part in rest.partition(" if "))
-    point = session.debugger.watch(name, condition)
-    session.tell(f"breakpoint {point.number}: before {name} is written")
+    point = session.debugger.watch(name, condition, access=access)
+    session.tell(f"breakpoint {point.number}: before {name} {ACCESSES[access]}")
 
 
 def delete(session: Session, rest: str) -> None:

@@ -68,6 +68,7 @@ class Symbols:
         self.instructions = instructions_of(image.code, image.used, known)
         names = [*image.symbols.names, *(name.removeprefix("_") for name in image.symbols.names)]
         names += [*self.variables.by_name, *(one.name for one in self.blocks.variables)]
+        self.meanings: dict[tuple[int, str, str], Meaning] = {}
         self.known = sorted({*names, *more, *SPECIAL, *SFRS, *BITS, *SIZES})
 
     # Places
@@ -144,39 +145,61 @@ class Moment:
 
     def find(self, name: str, module: str) -> Value:
         """What a name means; `module`: the file that is named before it, if any. Raises NoValue."""
-        if not module and (local := self.locals().get(name)):
-            return local()
+        key = (self.pc, name, module)
+        meaning = self.symbols.meanings.get(key)
+        if (
+            meaning is None
+        ):  # it depends on the instruction alone, and a condition asks for it again and again
+            meaning = self.symbols.meanings[key] = self._meaning(name, module)
+        return meaning(self)
+
+    def _meaning(self, name: str, module: str) -> Meaning:
+        """How the value of a name is found at this instruction. Raises NoValue for a name that means nothing."""
+        if not module and (local := self._local_meaning(name)):
+            return local
         if variable := self._variable(name, module):
-            return self.placed(variable)
+            return lambda moment: moment.placed(variable)
         if not module and (special := self._special(name)):
             return special
         symbol = self.symbols.image.symbols.find(name)
-        if symbol is None and not module and (value := value_on(self.core.device.board, name)):
-            return value
+        if symbol is None and not module and value_on(self.core.device.board, name):
+            return lambda moment: value_on(moment.core.device.board, name) or Value()
         if symbol is None:
-            owners = {one.function for one in self.symbols.blocks.variables if one.name == name}
-            placed = {one.scope for one in self.symbols.variables.by_name.get(name, ())}
-            remedy = did_you_mean(name, self.symbols.known)
-            if self._function in owners - placed:
-                raise NoValue(f"{name} is not live: no debug file says where this function keeps it")
-            if owners | placed:
-                remedy = f"it is a local variable of {', '.join(sorted(owners | placed))}"
-                remedy += f"; give {min(placed)}:{name}" if placed else ""
-            elif name == "lm629":
-                remedy = "it is a robot's, and this is the bare processor"
-            raise NoValue(f"there is no {name} here", remedy)
+            raise self._unknown(name)
         if symbol.space == "code":
-            return Value(number=symbol.address, space="code", note="an address of code")
-        if symbol.space == "iram":
-            self._refuse_shared(name, symbol.address, name.removeprefix("_").rpartition("_PARM_")[0])
+            return lambda moment: Value(number=symbol.address, space="code", note="an address of code")
         kind = _BIT if symbol.space == "bit" else _BYTE
-        return Value(kind, symbol.space, symbol.address, self, note="of unknown type")
+        function = name.removeprefix("_").rpartition("_PARM_")[0]
+
+        def value(moment: Moment) -> Value:
+            if symbol.space == "iram":
+                moment._refuse_shared(name, symbol.address, function)
+            return Value(kind, symbol.space, symbol.address, moment, note="of unknown type")
+
+        return value
+
+    def _unknown(self, name: str) -> NoValue:
+        owners = {one.function for one in self.symbols.blocks.variables if one.name == name}
+        placed = {one.scope for one in self.symbols.variables.by_name.get(name, ())}
+        remedy = did_you_mean(name, self.symbols.known)
+        if self._function in owners - placed:
+            return NoValue(f"{name} is not live: no debug file says where this function keeps it")
+        if owners | placed:
+            remedy = f"it is a local variable of {', '.join(sorted(owners | placed))}"
+            remedy += f"; give {min(placed)}:{name}" if placed else ""
+        elif name == "lm629":
+            remedy = "it is a robot's, and this is the bare processor"
+        return NoValue(f"there is no {name} here", remedy)
 
     def scope_of(self, name: str, module: str) -> str | None:
-        """The file or function of a variable with a place, "" for a global or a register; None for what is neither."""
+        """The file or function of a variable with a place, "" for a register or what only the map names; else None."""
         if variable := self._variable(name, module):
             return variable.scope
-        return "" if name in SFRS or name in BITS else None
+        symbol = self.symbols.image.symbols.find(name) if not module else None
+        named = (
+            name in SFRS or name in BITS or (symbol is not None and symbol.space in ("iram", "xram", "bit"))
+        )
+        return "" if named else None
 
     @property
     def _function(self) -> str:
@@ -230,6 +253,18 @@ class Moment:
         inner_last = reversed(places.visible(self.pc))
         in_memory = self.variables(places.name, places.module)
         return in_memory | {one.name: partial(self._local, places, one) for one in inner_last}
+
+    def _local_meaning(self, name: str) -> Meaning | None:
+        """The same of one name; None for what is no local variable here."""
+        places = self._places()
+        if places is None:
+            return None
+        variable = next((one for one in places.visible(self.pc) if one.name == name), None)
+        if variable is not None:
+            return lambda moment: moment._local(places, variable)
+        own = [one for one in self.symbols.variables.by_name.get(name, ()) if one.scope == places.name]
+        placed = max(own, key=lambda one: one.module == places.module, default=None)
+        return None if placed is None else lambda moment: moment.placed(placed)
 
     def _places(self) -> LocalPlaces | None:
         """Of the function that it stands in."""
@@ -307,29 +342,45 @@ class Moment:
         fields = self.symbols.variables.structs.get(places.module, {})
         return Value(variable.type, "iram", frame.base + 1 + variable.offset, self, fields=fields)
 
-    def _special(self, name: str) -> Value | None:
+    def _special(self, name: str) -> Meaning | None:
         """A register, a bit, a memory, the chips."""
-        cpu, board = self.core.cpu, self.core.board
         if name in _PORTS:
-            latch = cpu.sfr(SFRS[name])
-            pins = latch & levels_put_on(self.core.device.board, _PORTS.index(name))
-            note = "" if latch == pins else f"the latch; on the pins is {pins:#04x}"
-            return Value(_BYTE, "sfr", SFRS[name], self, note=note)
+            return lambda moment: moment._port(name)
         if name in SFRS or name == "A":
-            return Value(_BYTE, "sfr", SFRS["ACC" if name == "A" else name], self)
+            return lambda moment: Value(_BYTE, "sfr", SFRS["ACC" if name == "A" else name], moment)
         if len(name) == 2 and name[0] == "R" and name[1] in "01234567":
-            return Value(_BYTE, "iram", cpu.bank + int(name[1]), self)
+            return lambda moment: Value(_BYTE, "iram", moment.core.cpu.bank + int(name[1]), moment)
         if name in BITS:
-            return Value(_BIT, "bit", BITS[name], self)
+            return lambda moment: Value(_BIT, "bit", BITS[name], moment)
         if name in SIZES:
-            return Value(CType("array", SIZES[name], element=_BYTE, count=SIZES[name]), name, 0, self)
+            whole = CType("array", SIZES[name], element=_BYTE, count=SIZES[name])
+            return lambda moment: Value(whole, name, 0, moment)
         if name == "pins":
-            return Value(members={f"P{port}": partial(self._pins, port) for port in range(4)})
-        if name == "lm629" and board is not None:
-            board.sync(cpu.cycles * CYCLE_TICKS)
-            return Value(members={"left": partial(_chip, board.left), "right": partial(_chip, board.right)})
-        numbers = {"PC": self.pc, "DPTR": cpu.dptr, "cycle": cpu.cycles, "tick": cpu.cycles * CYCLE_TICKS}
-        return Value(number=numbers[name]) if name in numbers else None
+            return lambda moment: Value(
+                members={f"P{port}": partial(moment._pins, port) for port in range(4)}
+            )
+        if name == "lm629" and self.core.board is not None:
+            return Moment._chips
+        number = _NUMBERS.get(name)
+        return None if number is None else lambda moment: Value(number=number(moment))
+
+    def _port(self, name: str) -> Value:
+        latch = self.core.cpu.sfr(SFRS[name])
+        pins = latch & levels_put_on(self.core.device.board, _PORTS.index(name))
+        return Value(
+            _BYTE,
+            "sfr",
+            SFRS[name],
+            self,
+            note="" if latch == pins else f"the latch; on the pins is {pins:#04x}",
+        )
+
+    def _chips(self) -> Value:
+        board = self.core.board
+        if board is None:
+            raise self._unknown("lm629")
+        board.sync(self.core.cpu.cycles * CYCLE_TICKS)
+        return Value(members={"left": partial(_chip, board.left), "right": partial(_chip, board.right)})
 
     def _pins(self, port: int) -> Value:
         tap = CpuTap(self.core.board, lambda: None)
@@ -342,7 +393,19 @@ class Moment:
         cpu = self.core.cpu
         if space == "sfr" and address < 0x80:
             raise NoValue(f"{address:#04x} is no special function register", "they begin at sfr[0x80]")
+        if space == "iram":  # the usual case, and asked again and again
+            return bytes([cpu.peek_iram(place) for place in range(address, address + count)])
         return bytes_at(cpu, self.symbols.image, Variable("", "", address, space, CType("int", count), ""))
+
+
+Meaning = Callable[[Moment], Value]
+"""How a name becomes a value where a processor stands."""
+_NUMBERS: dict[str, Callable[[Moment], int]] = {
+    "PC": lambda moment: moment.pc,
+    "DPTR": lambda moment: moment.core.cpu.dptr,
+    "cycle": lambda moment: moment.core.cpu.cycles,
+    "tick": lambda moment: moment.core.cpu.cycles * CYCLE_TICKS,
+}
 
 
 def _chip(chip: Lm629, path: str = "") -> Value:

@@ -16,6 +16,8 @@ from miro_robot.mcs51.cpu import Cpu
 from miro_robot.mcs51.opcodes import LENGTH, goes_on, is_call, target
 
 _MOST_FRAMES = 128  # two bytes each fill internal RAM
+RESET_SP = 7
+_MOST_SHIFT = 32
 _LCALL_BYTES, _ACALL_BYTES = 3, 2
 
 
@@ -48,9 +50,9 @@ class Unwinder:
         self.from_reset = set(self._ways)
         self.vectors = set()
         for vector in VECTORS:
-            if vector not in self._ways:  # start-up code may lie where no interrupt is used
+            if vector not in self.from_reset:  # start-up code may lie where no interrupt is used
                 self.vectors.add(vector)
-                self._enter(vector)
+                self._enter(vector)  # also where the vector before runs into it, over NOP
         for first, _ in names.functions:
             if first not in self._ways:  # called by a pointer, if at all
                 self._enter(first)
@@ -92,13 +94,16 @@ class Unwinder:
         """Of the function that `cpu` is in; SP itself where the code does not tell."""
         return cpu.sp - self.heights.get(cpu.pc, (0, 0))[0]
 
-    def frames(self, cpu: Cpu) -> list[StackFrame]:
-        """From the innermost outwards. The last one is `known` if it is that of reset."""
+    def frames(self, cpu: Cpu, shifted: int = -1, by: int = 0) -> list[StackFrame]:
+        """From the innermost outwards. The last one is `known` if it is that of reset.
+
+        `by`: so many bytes more than the code says were pushed by the function of frame `shifted`.
+        """
         found: list[StackFrame] = []
         pc, place, sp = cpu.pc, cpu.pc, cpu.sp
         while len(found) < _MOST_FRAMES:
             height, entry = self.heights.get(pc, (0, -1))
-            base = sp - height
+            base = sp - height - (by if len(found) == shifted else 0)
             back = cpu.peek_iram(base - 1) | cpu.peek_iram(base) << 8
             by_interrupt = entry in self.vectors
             call = back if by_interrupt else self.call_before(back)
@@ -108,6 +113,24 @@ class Unwinder:
                 break
             pc, place, sp = back, call, base - 2
         return found
+
+    def out_of_step(self, cpu: Cpu, bottom: int) -> tuple[int, int] | None:
+        """(frame, bytes that its function pushed more than the code says, or fewer) which make the stack whole again.
+
+        `bottom`: SP where the stack is empty, -1 where that is not known. None where nothing is out of step, or no such
+        number explains it.
+        """
+        frames = self.frames(cpu)
+        whole = range(0x100) if bottom < 0 else (bottom,)
+        if frames[-1].known and frames[-1].base in (*whole, RESET_SP):
+            return None
+        for size in range(1, _MOST_SHIFT + 1):
+            for by in (size, -size):
+                for index in reversed(range(len(frames))):
+                    last = self.frames(cpu, index, by)[-1]
+                    if last.known and last.base in whole:
+                        return index, by
+        return None
 
     def call_before(self, address: int) -> int:
         """Where the call stands that returns to `address`; -1 where none does."""

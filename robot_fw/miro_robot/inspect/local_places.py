@@ -63,6 +63,7 @@ class LocalPlaces:
             address for address, _ in debug.lines if address in self.flow.held and address != function.first
         ]
         self.argument = self._argument(variables)
+        self._of: dict[tuple[LocalVariable, int], tuple[int, ...] | str] = {}
 
     # The argument that arrives in registers
 
@@ -164,6 +165,12 @@ class LocalPlaces:
 
     def of(self, one: LocalVariable, pc: int) -> tuple[int, ...] | str:
         """The bytes of a variable in registers, low byte first, or why they cannot be told."""
+        key = (one, pc)
+        if key not in self._of:
+            self._of[key] = self._is_at(one, pc)
+        return self._of[key]
+
+    def _is_at(self, one: LocalVariable, pc: int) -> tuple[int, ...] | str:
         held = self.flow.held.get(pc)
         if held is None:
             return "its code cannot be followed"

@@ -260,9 +260,11 @@ def test_breakpoints_that_cannot_be_set_say_why(adapter):
     places = [{"dataId": one} for one in ("iram:9999:1", "iram", "iram:48:1")]
     found = client.ask("setDataBreakpoints", breakpoints=places)["body"]["breakpoints"]
     assert [one["verified"] for one in found] == [False, False, True]
-    reads = [{"dataId": "iram:48:1", "accessType": kind} for kind in ("read", "readWrite", "write")]
+    reads = [{"dataId": "iram:48:1", "accessType": kind} for kind in ("read", "readWrite", "never", "write")]
     found = client.ask("setDataBreakpoints", breakpoints=reads)["body"]["breakpoints"]
-    assert [one["verified"] for one in found] == [False, False, True]
+    assert [one["verified"] for one in found] == [True, True, False, True]
+    info = client.ask("dataBreakpointInfo", name="failsafe:age")["body"]
+    assert info["accessTypes"] == ["write", "read", "readWrite"]
     assert client.ask("dataBreakpointInfo", name="A")["body"]["dataId"] is None
     client.send("reverseContinue", threadId=1)
     assert client.until(event="stopped")["body"]["description"] == "the run begins here"
