@@ -106,18 +106,26 @@ _NON_ASCII = re.compile(rb"[\x80-\xff]+")
 
 
 def decode(data: bytes) -> str:
-    """A text file of whatever program: UTF-16 or UTF-8 by its mark, else UTF-8, CP936 (Chinese Windows), or CP1252.
+    """A text file of whatever program, whose encoding `encoding_of` names."""
+    encoding, mark = encoding_of(data)
+    return data[mark:].decode(encoding, "replace")
 
-    What is not UTF-8 is CP936 if its bytes above 7Fh come in pairs: letters of CP1252 mostly stand alone.
+
+def encoding_of(data: bytes, whole: bool = True) -> tuple[str, int]:
+    """UTF-16 or UTF-8 by its mark, else UTF-8, CP936 (Chinese Windows), or CP1252; and the length of the mark.
+
+    What is not UTF-8 is CP936 if its bytes above 7Fh come in pairs: letters of CP1252 mostly stand alone. If `data` is
+    not the `whole` file, its last character may be cut.
     """
     for mark, encoding in _MARKS:
         if data.startswith(mark):
-            return data[len(mark) :].decode(encoding, "replace")
+            return encoding, len(mark)
     with suppress(UnicodeDecodeError):
-        return data.decode("utf-8")
+        codecs.getincrementaldecoder("utf-8")().decode(data, whole)
+        return "utf-8", 0
     lengths = [len(found) for found in _NON_ASCII.findall(data)]
     odd = [length for length in lengths if length & 1]
-    return data.decode("gb18030" if 2 * len(odd) < len(lengths) else "cp1252", "replace")
+    return ("gb18030" if 2 * len(odd) < len(lengths) else "cp1252"), 0
 
 
 def check_ends(path: str | os.PathLike[str]) -> None:

@@ -14,9 +14,10 @@ from miro_exact.bad_input import BadInput, amount
 from miro_exact.inputs import TEXT_BYTES
 from miro_protocol import stream
 from miro_protocol.actions import ScriptItem
-from mirotwin.recording.capture.detect import TIMED, detect
+from mirotwin.recording.capture.detect import detect
+from mirotwin.recording.capture.forms import FORMS
 from mirotwin.recording.capture.input import Input
-from mirotwin.recording.capture.source import READ_ERRORS, open_source
+from mirotwin.recording.capture.source import READ_ERRORS, open_capture
 
 OPTION = "--corpus"
 INPUT_BYTES = 8192
@@ -28,6 +29,8 @@ FOREIGN = (
     ".md", ".txt", ".log", ".png", ".jpg", ".pdf", ".csv", ".vcd", ".zip", ".gz", ".info", ".lst", ".world",
 )  # fmt: skip
 """Suffixes of files that are no inputs, whatever bytes they hold."""
+TIMED = ("pcapng", "pcap", "recording", "stream")
+"""Forms that are taken for what was sent; other text may as well be an input."""
 _NAMED = 3
 MOST = 2000
 """Inputs that are taken from a folder."""
@@ -83,7 +86,7 @@ def _files(folder: Path) -> Iterator[Path]:
 def _inputs_in(path: Path, convert: Convert) -> list[bytes]:
     """The content of a file as inputs; none for a file of another kind."""
     with Input(str(path)) as given:
-        format, _ = detect(given.peek())
+        format = detect(given.peek()).form
         if format in TIMED:
             by_network: dict[int, list[ScriptItem]] = {}
             for item in _script(given, format):
@@ -97,4 +100,4 @@ def _inputs_in(path: Path, convert: Convert) -> list[bytes]:
 def _script(given: Input, format: str) -> Iterator[ScriptItem]:
     if format == "stream":  # may hold what is done to robots, too
         return iter(stream.decode(given.read(TEXT_BYTES), given.label).script())
-    return iter(open_source(given, format, lambda text: None).sent)
+    return open_capture(given, lambda text: None, form=FORMS[format]).sent

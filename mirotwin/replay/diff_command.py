@@ -15,6 +15,7 @@ from miro_exact.inputs import RECORDING_BYTES, check_no_folder, read_input
 from miro_robot.image import FLASH_BYTES, SPACE_BYTES
 from miro_sim.scenario.board import BoardScenario
 from miro_sim.scenario.board_scenario import BoardText, load_any
+from mirotwin.recording.capture.options import CaptureOptions
 from mirotwin.recording.compare import CompareRule, only_robots, robots_of
 from mirotwin.recording.reader import parse
 from mirotwin.recording.writer import MAGIC
@@ -63,7 +64,7 @@ class DiffOptions(Options, frozen=True, kw_only=True):
             "--on",
             metavar="SCENARIO|FILE",
             type=ScenarioName(),
-            help="What two images run: a scenario, or the bytes of a stream, a case or a recording.",
+            help="What two images run: a scenario, or the bytes of a stream, a case, a recording or a capture.",
         ),
     ] = DEFAULT_SCENARIO
     seed: Annotated[int | None, SEED.saying("Master seed of all noise, for two images.")] = None
@@ -71,6 +72,7 @@ class DiffOptions(Options, frozen=True, kw_only=True):
         tuple[str, ...], SET.saying("A key of the scenario, for two images, as for `run`.")
     ] = ()
     compare: CompareOptions = CompareOptions()
+    capture: CaptureOptions = CaptureOptions()
     lines_from: LinesFrom = ()
     sources: SourceFolders = ()
     plugins: PluginFiles = PluginFiles()
@@ -181,7 +183,7 @@ def _read_recording(path: str, options: DiffOptions) -> ComparedRun:
 def _run_images(options: DiffOptions) -> tuple[ComparedRun, ComparedRun]:
     on = file_in(options.on, (*RECORDINGS, *CASES))
     if Path(on).is_file() and not on.endswith(".toml"):
-        job = load_job(on, options.a, options.settings, options.seed)
+        job = load_job(on, options.a, options.settings, options.seed, capture=options.capture)
         complain(*job.notes)
         spec, end_tick = job.spec, job.end_tick
         if job.alone:

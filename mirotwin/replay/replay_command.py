@@ -14,6 +14,7 @@ from miro_exact.bad_input import BadInput, amount
 from miro_exact.clock import CONTROL_PERIOD_TICKS
 from miro_robot.image import Image
 from mirotwin.desk.guard import DeskOptions
+from mirotwin.recording.capture.options import CaptureOptions
 from mirotwin.replay.difference import ComparedRun, RunDifference, compare_runs
 from mirotwin.replay.lockstep.annotated_image import annotated_of
 from mirotwin.replay.options import CompareOptions, check_reaches, extent, refuse_given, rule_as_json
@@ -53,6 +54,7 @@ class ReplayOptions(CaseOptions, frozen=True, kw_only=True):
     ] = ()
     compare: CompareOptions = CompareOptions()
     desk: DeskOptions = DeskOptions()
+    capture: CaptureOptions = CaptureOptions()
     out: Annotated[
         Path | None, OUT.saying("Folder of the recording. Default: runs/FILE-port.", heading=AT_PORT)
     ] = None
@@ -81,15 +83,15 @@ class ReplayOptions(CaseOptions, frozen=True, kw_only=True):
 def replay(options: ReplayOptions) -> int:
     """Sends the bytes of FILE again and compares what the robot does.
 
-    FILE is a run.mcap, a text stream, or the folder of a run or of a failed test.
+    FILE is a run.mcap, a text stream, a capture of a serial line, or the folder of a run or of a failed test.
 
     Exit code 4 when it differs from the recording; if a firmware fault comes of it too, the code is 4. The first
     difference is printed on stderr, and the first of each channel in a table. Where the runs differ, both are repeated
     to find the first tick and field in which their states do, and with another --firmware the first instruction.
 
     A recording that was broken off, or a part of one, is compared as far as it goes, with a note. A text stream runs
-    over an ideal link in the default scenario, and there is nothing to compare. `mirotwin export` makes one of a
-    capture (pcapng); for bytes without times add a time to each line first: `TICK > HEX BYTES` a transmission.
+    over an ideal link in the default scenario, and there is nothing to compare. So does a capture of any form that
+    `mirotwin decode` reads; one without times needs --assume-contiguous.
 
     A case (a stream with `verdict` in its header) runs to its end, and the exit code is that of the check that failed:
     1, or 3 for a firmware fault. 0: fixed by your change of firmware or settings. 4: it no longer fails, unchanged.
@@ -150,7 +152,7 @@ def _loaded(file: str, options: ReplayOptions) -> tuple[Job, list[Image]]:
     if options.stack_from is not None and options.firmware is None:
         raise click.UsageError("--stack-from needs --firmware; a recorded image has its own.")
     keys = (*options.settings, *as_settings(options.expected))
-    job = load_job(file, options.firmware, keys, options.seed, options.stack_from)
+    job = load_job(file, options.firmware, keys, options.seed, options.stack_from, options.capture)
     complain(*job.notes)
     if job.alone and options.desk.port:
         raise BadInput(file, "--port", "is for robots, and this is for a board", "leave it out")

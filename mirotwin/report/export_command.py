@@ -16,11 +16,11 @@ from miro_protocol.transmission import DOWN, Transmission
 from miro_sim.scenario.board import BoardScenario
 from miro_sim.scenario.board_scenario import check_single
 from mirotwin.recording.capture import render
-from mirotwin.recording.capture.detect import NAMES, TIMED, detect
+from mirotwin.recording.capture.forms import Form
 from mirotwin.recording.capture.input import STDIN, Input
 from mirotwin.recording.capture.layout import look
-from mirotwin.recording.capture.source import READ_ERRORS, open_source
-from mirotwin.recording.decode_command import FORMAT
+from mirotwin.recording.capture.options import CaptureOptions
+from mirotwin.recording.capture.source import READ_ERRORS, form_of, timed_capture
 from mirotwin.report.board_export import HEAD_BYTES, board_rows, board_stream, is_of_board
 from mirotwin.report.tables import Named, Tables, recorded_rows, wire_row
 from mirotwin.runs.job import Job, load_job
@@ -34,10 +34,10 @@ from mirotwin.shell.progress import ProgressBar
 from mirotwin.shell.verdicts import BAD_INPUT, DONE
 
 
-def export_foxglove(given: Input, format: str, out: str, quiet: bool) -> int:
+def export_foxglove(given: Input, form: Form, out: str, quiet: bool) -> int:
     """Writes what `given` holds with Foxglove's topics to `out`; returns the exit code. Raises BadInput."""
-    if format != "recording":
-        reason = f"{NAMES[format]}, which holds no postures"
+    if form.name != "recording":
+        reason = f"{form.title}, which holds no postures"
         raise BadInput(given.label, "", reason, "give a run.mcap that `mirotwin run` wrote")
     from mirotwin.report.foxglove.convert import Conversion  # loads most of the package
 
@@ -122,9 +122,9 @@ class ExportOptions(Options, frozen=True, kw_only=True):
         str | None,
         Option(metavar="CHANNEL", help="CSV: only this table, such as net0/robot0/truth, into --out itself."),
     ] = None
-    format: Annotated[str | None, FORMAT.saying(FORMAT.help, type=click.Choice(TIMED))] = None
     network: Annotated[int | None, NETWORK.saying("Only this network. Default: all.")] = None
     plugins: PluginFiles = PluginFiles()
+    capture: CaptureOptions = CaptureOptions()
     force: Annotated[bool, FORCE] = False
     quiet: Annotated[bool, QUIET.saying("No progress bar and no closing line.")] = False
     engine: Engine = None
@@ -132,8 +132,10 @@ class ExportOptions(Options, frozen=True, kw_only=True):
 
 @command_of(ExportOptions)
 def export(options: ExportOptions) -> int:
-    """Writes the characters in FILE (a recording, a stream file or a pcapng capture) as pcapng or as a stream file, or
-    a recording for Foxglove.
+    """Writes the characters in FILE as pcapng or as a stream file, or a recording for Foxglove.
+
+    FILE is a recording, a stream file, or a capture of any form that `mirotwin decode` reads; one without times needs
+    --assume-contiguous.
 
     pcapng is for Wireshark and tshark: one packet a transmission (characters without a pause), with virtual time,
     direction, and the network as interface; link type 250 (RTAC serial). A script for Wireshark shows the
@@ -173,22 +175,20 @@ def export(options: ExportOptions) -> int:
     if out != STDIN and to != "csv":
         check_new(Path(out), "--out", options.force, options.file)
     with Input(options.file) as given, ProgressBar("exporting", given.size, quiet) as bar:
-        format = options.format or detect(given.peek())[0]
+        form = form_of(given, options.capture, complain)
         if to == "foxglove":
-            return export_foxglove(given, format, out, quiet)
-        of_board = to != "pcapng" and is_of_board(given.peek(HEAD_BYTES), format)
+            return export_foxglove(given, form, out, quiet)
+        of_board = to != "pcapng" and is_of_board(given.peek(HEAD_BYTES), form.name)
         if to == "csv":
             if of_board and options.file == STDIN:
                 raise BadInput(given.label, "--as csv", "a board is run again for it", "give a file, not -")
-            return export_tables(options, given, format, bar, of_board)
+            return export_tables(options, given, form, bar, of_board)
         if of_board and options.file != STDIN:
             return export_board(options)
-        if format not in TIMED:
-            raise no_times(given, format)
-        source = open_source(given, format, complain)
+        source = timed_capture(given, complain, options.capture, form)
         layouts = look(source, None, complain) if to == "stream" else None
         exported = Exported(source.sent, network, given, bar)
-        pieces = render.to_stream(exported, layouts.of) if layouts else render.to_pcapng(exported)
+        pieces = render.to_stream(exported, layouts.of, source) if layouts else render.to_pcapng(exported)
         with BadInput.at(given.label):
             _write(out, _some(pieces, exported, given.label))
     if not quiet and out != STDIN:
@@ -203,20 +203,18 @@ def export(options: ExportOptions) -> int:
     return DONE
 
 
-def export_tables(options: ExportOptions, given: Input, format: str, bar: ProgressBar, of_board: bool) -> int:
+def export_tables(options: ExportOptions, given: Input, form: Form, bar: ProgressBar, of_board: bool) -> int:
     """Writes CSV, of what could be read; returns the exit code. Raises BadInput."""
-    recorded, only = format == "recording", options.channel
+    recorded, only = form.name == "recording", options.channel
     only = only and only.strip("/")
     if options.out == STDIN and recorded and not only:
         remedy = "give --channel, such as net0/robot0/truth"
         raise BadInput(given.label, "--out -", "takes one table, and a recording is several", remedy)
-    if format not in TIMED:
-        raise no_times(given, format)
     job = _board(options) if of_board else None
     failure: Exception | None = None
     with Tables(options.out, bool(only) or not recorded, only, options.force, options.file) as tables:
         try:
-            for table, row in _rows(options, given, format, job):
+            for table, row in _rows(options, given, form, job):
                 tables.add(table, row)
                 bar.to(given.position)
         except READ_ERRORS as error:
@@ -235,21 +233,16 @@ def export_tables(options: ExportOptions, given: Input, format: str, bar: Progre
     return DONE
 
 
-def _rows(options: ExportOptions, given: Input, format: str, job: Job | None) -> Iterator[Named]:
+def _rows(options: ExportOptions, given: Input, form: Form, job: Job | None) -> Iterator[Named]:
     """The rows of a file; of a board's run, `job`, also its changes, for which it is run again."""
-    if format == "recording":
+    if form.name == "recording":
         yield from recorded_rows(given, options.network)
     elif job is None:
-        sent = open_source(given, format, complain).sent
+        sent = timed_capture(given, complain, options.capture, form).sent
         yield from (wire_row(one) for one in sent if options.network in (None, one.network))
     if job is not None:
         with ProgressBar("running it again", job.end_tick, options.quiet) as bar:
             yield from board_rows(job, bar.to)
-
-
-def no_times(given: Input, format: str) -> BadInput:
-    reason = f"{NAMES[format]} without times"
-    return BadInput(given.label, "", reason, "give a recording, stream or capture")
 
 
 def _board(options: ExportOptions) -> Job:

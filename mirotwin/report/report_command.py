@@ -14,6 +14,7 @@ from miro_exact.inputs import read_input, replace_file
 from miro_robot.image import Image
 from miro_sim.scenario.board import BoardScenario
 from miro_sim.scenario.board_scenario import check_single
+from mirotwin.recording.capture.options import CaptureOptions
 from mirotwin.recording.compare import CompareRule, differences
 from mirotwin.report.page.board_page import board_page
 from mirotwin.report.page.bokeh_page import require_bokeh
@@ -60,6 +61,7 @@ class ReportOptions(Options, frozen=True, kw_only=True):
     ] = None
     sources: SourceFolders = ()
     plugins: PluginFiles = PluginFiles()
+    capture: CaptureOptions = CaptureOptions()
     force: Annotated[bool, FORCE] = False
     quiet: Annotated[bool, QUIET] = False
     engine: Engine = None
@@ -115,7 +117,7 @@ def page_of(wanted: ReportOptions, name: str = "") -> bytes:
     twin. Raises BadInput, and OSError as `open` does.
     """
     file = _file_of(wanted.subject)
-    job = load_job(file, wanted.firmware)
+    job = load_job(file, wanted.firmware, capture=wanted.capture)
     if isinstance(job.spec.scenario, BoardScenario):
         check_single(job.spec.scenario, str(file), "a page")
     window(wanted.from_time, wanted.to_time, job.spec.scenario.clock)

@@ -31,8 +31,10 @@ from miro_sim.scenario.plugins import REGISTRIES
 from miro_sim.scenario.settings import EXPECT, blamed, in_text, make
 from miro_sim.world.machine import no_network
 from mirotwin.recording.capture.detect import detect
-from mirotwin.recording.capture.input import HEAD_BYTES
-from mirotwin.recording.capture.layout import frame_counts
+from mirotwin.recording.capture.heads import frame_counts
+from mirotwin.recording.capture.input import HEAD_BYTES, Input
+from mirotwin.recording.capture.options import AS_IT_SAYS, CaptureOptions
+from mirotwin.recording.capture.source import form_of, timed_capture
 from mirotwin.recording.reader import Recording, parse
 from mirotwin.recording.recorder import SCENARIO_ATTACHMENT, RunSource
 from mirotwin.recording.writer import MAGIC
@@ -48,7 +50,7 @@ from mirotwin.runs.board_case import (
 from mirotwin.runs.result import Result, expectation_lines, result_of_case
 from mirotwin.runs.run import Run, replaying
 from mirotwin.runs.spec import RunSpec
-from mirotwin.shell.command import command_line, operand, shell_line
+from mirotwin.shell.command import shell_line
 from mirotwin.shell.firmware_image import load_firmware
 from mirotwin.shell.options import plain_parameters
 from mirotwin.shell.outputs import RECORDING
@@ -156,7 +158,10 @@ def _default_scenario(script: Sequence[ScriptItem]) -> Scenario:
     end_tick = max(ends) + AFTERMATH_TICKS
     if end_tick > LONGEST_TICKS:
         last = max(one.tick for one in script)
-        raise BadInput("", f"tick {last}", "more than a day", "let the stream start near tick 0")
+        remedy = (
+            "cut the capture, or let the stream start near tick 0 (`mirotwin export` makes one of a capture)"
+        )
+        raise BadInput("", f"tick {last}", "more than a day", remedy)
     count = 1 + max(one.network for one in script)
     settings = ["camera={kind = 'gaussian'}", "expect={}"]  # nothing steers by it or is expected
     base = load(DEFAULT_SCENARIO, settings).scenario
@@ -202,7 +207,8 @@ class Job(msgspec.Struct, frozen=True, kw_only=True):
     `spec`: the run, on the image to play it to. `image`: the one that was recorded, None where it is none. `state`: the
     form of the states whose digests were recorded, if a replay computes the same states, else empty: a controller's
     states are not computed again. `source`: what the recording was made from. `notes`: what there is to know of the
-    file, a line each. `as_recorded`: a recording's run without other settings, seed or firmware.
+    file, a line each. `captured_as`: the form of a capture by another tool, else empty. `as_recorded`: a recording's
+    run without other settings, seed or firmware.
     """
 
     spec: RunSpec
@@ -212,6 +218,7 @@ class Job(msgspec.Struct, frozen=True, kw_only=True):
     case: Case = Case()
     source: RunSource | None = None
     notes: Sequence[str] = ()
+    captured_as: str = ""
     as_recorded: RunSpec | None = None
 
     @property
@@ -276,11 +283,12 @@ def load_job(
     settings: Sequence[str] = (),
     seed: int | None = None,
     stack_from: int | None = None,
+    capture: CaptureOptions = AS_IT_SAYS,
 ) -> Job:
     """Reads `file` and loads the requested image, the recorded one, or the robot's own.
 
     `settings`: keys to set in the recorded scenario, or in the default one. `seed`: instead of its own.
-    `stack_from`: where the stack of `firmware` begins.
+    `stack_from`: where the stack of `firmware` begins. `capture`: how a capture of another tool is read.
     """
     check_no_folder(file, RECORDING)
     data = read_input(file, prefix=MAGIC, prefix_limit=RECORDING_BYTES)
@@ -291,16 +299,17 @@ def load_job(
         limit = SPACE_BYTES if recording.source.board else FLASH_BYTES
         runs_on = None if firmware is None else load_firmware(firmware, limit, stack_from=stack_from)
         return _job_of_recording(recording, file, settings, runs_on, seed)
-    given = _stream(data, file)
+    given, notes, captured_as = _stream(data, file, capture)
     header = given.header
     image = _image_for(given, firmware or image_beside(file, header.firmware_sha256), stack_from)
-    wanted, notes = header.firmware_sha256, []
+    wanted = header.firmware_sha256
     if wanted not in (None, image.sha256):
         reason = f"the stream is for firmware {wanted[:12]}.., this is {image.sha256[:12]}.. ({image.path})"
         if firmware is None:
             raise BadInput(file, "header", reason, "name the image with --firmware")
-        notes = [f"{file}: {reason}"]  # to run another one is what a replay is for
-    return replace(_job_of_stream(given, file, settings, image, seed), notes=notes)
+        notes.append(f"{file}: {reason}")  # to run another one is what a replay is for
+    job = _job_of_stream(given, file, settings, image, seed)
+    return replace(job, notes=notes, captured_as=captured_as)
 
 
 def _image_for(given: stream.StreamFile, firmware: str | Path | None, stack_from: int | None = None) -> Image:
@@ -367,31 +376,27 @@ def recording_notes(recording: Recording, path: str) -> list[str]:
 def load_stream(file: str, firmware: str | None) -> Job:
     """The job of a stream file on this firmware (None: the robot's own), whatever firmware it is for."""
     check_no_folder(file, RECORDING)
-    given = _stream(read_input(file), file)
+    given, _, _ = _stream(read_input(file), file, AS_IT_SAYS)
     return _job_of_stream(given, file, (), _image_for(given, firmware), None)
 
 
-_PAIRS = re.compile(rb"^\s*[0-9a-fA-F]{2}", re.MULTILINE)
-_BINARY = re.compile(rb"[\0-\x08\x0e-\x1f]")
-_WRITE_TIMES = "of bytes alone make a stream file, whose lines are `TICK > HEX BYTES` (24 000 ticks are 1 ms)"
-
-
-def _stream(data: bytes, path: str) -> stream.StreamFile:
-    """The stream file with this content. Raises BadInput for another format, StreamError for what is wrong in it."""
-    format, _ = detect(data[:HEAD_BYTES])
-    if path.endswith(".toml") and format != "stream":
+def _stream(data: bytes, path: str, capture: CaptureOptions) -> tuple[stream.StreamFile, list[str], str]:
+    """The stream file with this content, or one of the characters in a capture; notes, and what the capture is ("": a
+    stream file). Raises BadInput.
+    """
+    if path.endswith(".toml") and detect(data[:HEAD_BYTES]).form != "stream":
         reason = "is no run, but what one is made from"
         raise BadInput(path, "", reason, "run it with `mirotwin run`, and give the run.mcap that it writes")
-    if format == "pcapng":
-        line = command_line("export", operand(path), "--out", "NAME.stream")
-        reason = "a capture, which cannot be replayed"
-        raise BadInput(path, "offset 0", reason, f"make a stream file of it with `{line}`")
-    if format == "hex" and _PAIRS.search(data):
-        raise BadInput(path, "offset 0", "hex text without times, which cannot be replayed", _WRITE_TIMES)
-    if format != "stream" and _BINARY.search(data[:4096]):
-        reason = "neither a recording nor a stream file (UTF-8 text)"
-        raise BadInput(path, "offset 0", reason, f"give a run.mcap that `mirotwin run` wrote; {_WRITE_TIMES}")
-    return stream.decode(data, path)
+    if not data:
+        raise BadInput(path, "offset 0", "empty file", "give a run.mcap, a stream file or a capture")
+    notes: list[str] = []
+    given = Input.of(data, path)
+    form = form_of(given, capture, notes.append)
+    if form.name == "stream":
+        return stream.decode(data, path), notes, ""
+    source = timed_capture(given, notes.append, capture, form)
+    sent = sorted(source.sent, key=lambda one: one.tick)
+    return stream.StreamFile(tuple(map(stream.Entry, sent)), source=path), notes, form.title
 
 
 def _job_of_recording(

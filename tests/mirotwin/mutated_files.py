@@ -132,7 +132,7 @@ class Seeds:
         self.pieces.append(EVENTS)
         self._add_pictures()
         raw = bytes.fromhex("5555555555ff2dd4fc") + bytes(range(40))
-        decode = [["decode", "@"], ["decode", "@", "--format", "raw", "--json"]]
+        decode = [["decode", "@"], ["decode", "@", "--from-form", "raw", "--json"]]
         self.kinds["raw"] = ("a.bin", raw * 3, decode)
         self.kinds["hex text"] = ("a.txt", raw.hex(" ").encode() + b" # end\n", [["decode", "@"]])
 

@@ -1,62 +1,113 @@
-"""Which format a file is in, by its first bytes.
+"""Which form a file has, by its first 64 KiB.
 
 | the file begins with | it is |
 |---|---|
-| the four bytes that a pcapng or an old pcap file begins with | pcapng |
+| the four bytes that a pcapng file begins with | pcapng |
+| the four bytes that a pcap file begins with | pcap |
 | at least four of the bytes that an MCAP file begins with | recording |
 | comments or none, then `TICK >`, `TICK <` or `TICK *`; or `# mirotwin stream` | stream |
+| a zip file with a sigrok session's parts | sigrok |
+| `$date`, `$version`, `$comment` or `$timescale` | vcd |
+| a line of names with a time and a value | saleae, table |
+| a line of names with a time, and levels 0 and 1 | edges |
+| sigrok's comments with a sample rate, and levels 0 and 1 | samples |
+| lines such as `uart-1: 55` | annotations |
+| offsets that agree with the bytes between them | hexdump, xxd, od |
+| lines with a time and pairs of hexadecimal digits | stamped |
 | nothing but pairs of hexadecimal digits, separators and comments | hex |
-| anything else, nothing included | raw |
+| the first line of a PuTTY log | putty |
+| anything else that is no text, nothing included | raw |
 
-Any bytes may be a raw capture, so the first four rules can be wrong about one; the format is therefore always
-printed, and can be forced.
+Any bytes may be a raw capture, so the other rules can be wrong about one; the form is therefore always printed, and can
+be forced.
 """
 
 from __future__ import annotations
 
 import re
-import string
+from typing import NamedTuple
 
 from miro_protocol.pcapng_reader import CLASSIC_PCAP
 from miro_protocol.pcapng_reader import MAGIC as PCAPNG
-from mirotwin.recording.capture.hextext import BOM, HexText
+from mirotwin.recording.capture import dumps, hexlines
+from mirotwin.recording.capture.forms import TERMINAL
+from mirotwin.recording.capture.hextext import HexText
 from mirotwin.recording.capture.input import HEAD_BYTES
+from mirotwin.recording.capture.tables import table_of
+from mirotwin.recording.capture.text import is_text, text_of
 from mirotwin.recording.writer import MAGIC as MCAP
 
-TIMED = ("pcapng", "recording", "stream")
-FORMATS = ("hex", "raw", *TIMED)
-NAMES = {
-    "hex": "hex text",
-    "raw": "raw bytes",
-    "pcapng": "pcapng capture",
-    "recording": "recording",
-    "stream": "stream file",
-}
-
 _ENOUGH = 4
+_SAMPLE_LINES = 200
 _PACKED = {b"\x1f\x8b\x08": "gzip", b"PK\x03\x04": "zip", b"\xfd7zXZ\0": "xz", b"\x28\xb5\x2f\xfd": "zstd"}
 _STREAM = re.compile(
-    rb"(?:\xef\xbb\xbf)?(?:#\s*mirotwin stream\b|(?:\s|#[^\n]*+\n)*+[0-9.]+[a-z]*[ \t]+[<>*])"
+    r"#\s*mirotwin stream\b|(?:\s|#[^\n]*+\n)*+(?:[0-9]+|[0-9.]+(?:h|min|s|ms|us))[ \t]+[<>*]", re.ASCII
 )
-_TEXT = bytes(string.printable, "ascii")
+_VCD = re.compile(rb"(?:\xef\xbb\xbf)?\s*\$(?:date|version|comment|timescale|scope)\s")
+_SIGROK = (b"metadata", b"logic-1")
 
 
-def detect(head: bytes) -> tuple[str, str]:
-    """(format, a note for the user or the empty string) of a file that begins with `head`.
+class Detected(NamedTuple):
+    """`form`: of `FORMS`, "" for none. `why`: what it was recognised by, or what it is instead, and a remedy."""
 
-    `head` is the whole file, or its first `input.HEAD_BYTES`.
-    """
-    if head.startswith((PCAPNG, *CLASSIC_PCAP)):
-        return "pcapng", ""
+    form: str
+    why: str
+    remedy: str = ""
+
+
+def detect(head: bytes) -> Detected:
+    """The form of a file that begins with `head`: the whole file, or its first `input.HEAD_BYTES`."""
+    whole = len(head) < HEAD_BYTES
+    if found := _by_first_bytes(head):
+        return found
+    if _STREAM.match(text_of(head, whole)):
+        return Detected("stream", "its first line is one of ticks")
+    if found := _by_lines(head, whole):
+        return found
+    if HexText.begins(head, whole):
+        return Detected("hex", "nothing but pairs of hex digits")
+    if TERMINAL.match(head):
+        return Detected("putty", "its first line is PuTTY's")
+    if is_text(head, whole):
+        return Detected("", "is text in no form that is known", "name it with --from-form, or take it as raw")
+    return Detected("raw", "no form fits")
+
+
+def _by_first_bytes(head: bytes) -> Detected | None:
+    if head.startswith(PCAPNG):
+        return Detected("pcapng", "its first bytes are those of one")
+    if head.startswith(CLASSIC_PCAP):
+        return Detected("pcap", "its first bytes are those of one")
     if len(head) >= _ENOUGH and (head.startswith(MCAP) or MCAP.startswith(head)):
-        return "recording", ""
-    if _STREAM.match(head):
-        return "stream", ""
-    if HexText.begins(head, len(head) < HEAD_BYTES):
-        return "hex", ""
+        return Detected("recording", "its first bytes are those of one")
+    if _VCD.match(head):
+        return Detected("vcd", "its first word is of one")
     for magic, packer in _PACKED.items():
         if head.startswith(magic):
-            return "raw", f"looks packed by {packer}, unpack it first; read as raw bytes"
-    if head.removeprefix(BOM) and not head.removeprefix(BOM).translate(None, _TEXT):
-        return "raw", "is text, but neither pairs of hex digits nor a stream file; read as raw bytes"
-    return "raw", ""
+            if packer == "zip" and any(name in head for name in _SIGROK):
+                return Detected("sigrok", "a zip file with its parts")
+            if b"digital-0.bin" in head or b"meta.json" in head:
+                return Detected("", "is a Logic 2 session", "export its data as CSV (File, Export)")
+            return Detected("", f"is packed by {packer}", "unpack it first, or take it as --from-form raw")
+    return None
+
+
+def _by_lines(head: bytes, whole: bool) -> Detected | None:
+    text = text_of(head, whole)
+    if "\0" in text[:_ENOUGH]:
+        return None
+    lines = re.split(r"\r\n|\n|\r", text)
+    lines = [line for line in (lines if whole or len(lines) == 1 else lines[:-1]) if line.strip()]
+    lines = lines[:_SAMPLE_LINES]
+    if not lines:
+        return None
+    if table := table_of(lines):
+        return Detected(table.form, table.described)
+    most = len(lines) / 2
+    if 2 * (count := dumps.fits_annotations(lines)) > len(lines):
+        return Detected("annotations", f"{count} of the first {len(lines)} lines are of a UART decoder")
+    if base := dumps.base_of(lines):
+        return Detected(dumps.kind_of(lines), f"its offsets, to base {base}, agree with the bytes between")
+    if (count := hexlines.fits(lines)) > most:
+        return Detected("stamped", f"{count} of the first {len(lines)} lines are of times and hex digits")
+    return None

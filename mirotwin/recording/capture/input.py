@@ -6,6 +6,7 @@ import io
 import os
 import stat
 import sys
+from io import BytesIO
 from typing import BinaryIO
 
 from miro_exact.inputs import InputError, check_ends, check_no_folder
@@ -71,6 +72,29 @@ class Input:
         data = bytes(read1(CHUNK_BYTES))
         self.position += len(data)
         return data
+
+    def whole(self) -> BinaryIO:
+        """The whole file from its beginning, in which one can move; of a pipe, a copy."""
+        if self.size is not None:
+            self._head = b""
+            self._file.seek(0)
+            return self._file
+        import tempfile
+
+        copy = tempfile.TemporaryFile()  # noqa: SIM115
+        while data := self.read_some():
+            copy.write(data)
+        copy.seek(0)
+        return copy
+
+    @classmethod
+    def of(cls, data: bytes, path: str) -> Input:
+        """What was read of `path` already."""
+        given = cls.__new__(cls)
+        given.path = given.label = path
+        given.position, given._head = 0, b""
+        given._file, given.size = BytesIO(data), len(data)
+        return given
 
     def readline(self, limit: int) -> bytes:
         """The next line with its end, or the first `limit` bytes of a longer one; empty at the end."""

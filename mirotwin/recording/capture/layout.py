@@ -2,51 +2,17 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable, Iterator, Sequence
-
-import msgspec
+from collections.abc import Callable, Sequence
 
 from miro_exact.bad_input import amount
 from miro_exact.inputs import InputError
 from miro_protocol.table import ROBOT_COUNTS
-from miro_protocol.transmission import DOWN, UP, Transmission
-from mirotwin.recording.capture.source import READ_ERRORS, Source
+from miro_protocol.transmission import DOWN, Transmission
+from mirotwin.recording.capture.heads import frame_counts, head_of
+from mirotwin.recording.capture.source import Source
 
-HEAD_CHARACTERS = 1 << 16
 MOST_NETWORKS = 64
 SHOWN_NETWORKS = 8
-
-
-def head_of(sent: Iterator[Transmission]) -> tuple[list[Transmission], Iterator[Transmission]]:
-    """The first transmissions, and an iterator over all; an error comes in its place."""
-    head: list[Transmission] = []
-    size = 0
-    failure: Exception | None = None
-    try:
-        while size < HEAD_CHARACTERS and (transmission := next(sent, None)) is not None:
-            head.append(transmission)
-            size += len(transmission.data)
-    except READ_ERRORS as error:
-        failure = error
-
-    def everything() -> Iterator[Transmission]:
-        yield from head
-        if failure is not None:
-            raise failure
-        yield from sent
-
-    return head, everything()
-
-
-def frame_counts(sent: Iterable[Transmission]) -> dict[int, int]:
-    """Valid frames from a host in each layout, 3 and 5."""
-    from miro_protocol.decoder import Decoder  # a hot module: not before the engine was chosen
-
-    decoders = {count: Decoder(count) for count in ROBOT_COUNTS}
-    for transmission in sent:
-        for decoder in decoders.values():
-            decoder.hear(transmission)
-    return {count: decoder.valid for count, decoder in decoders.items()}
 
 
 def robots_in(head: Sequence[Transmission], network: int) -> tuple[int, str]:
@@ -65,16 +31,6 @@ def robots_in(head: Sequence[Transmission], network: int) -> tuple[int, str]:
     else:
         return best, ""
     return best, f"network {network}: {note} (--robots says otherwise)"
-
-
-def is_telemetry(head: Sequence[Transmission]) -> bool:
-    """Whether raw bytes read as robots' answers rather than as a host's frames."""
-    from miro_protocol.decoder import TelemetryDecoder
-
-    decoder = TelemetryDecoder()
-    for transmission in head:
-        decoder.hear(transmission)
-    return decoder.valid > max(frame_counts(head).values())
 
 
 class Layouts:
@@ -114,15 +70,9 @@ class Layouts:
         return "".join(f", network {network} of {self.of(network)} robots" for network in networks)
 
 
-def look(
-    source: Source, requested: int | None, tell: Callable[[str], None], guess_direction: bool = False
-) -> Layouts:
-    """Looks at the beginning of `source` for what it does not say: layout, and the direction of raw bytes."""
+def look(source: Source, requested: int | None, tell: Callable[[str], None]) -> Layouts:
+    """Looks at the beginning of `source` for the layout, where nobody says."""
     head: list[Transmission] = []
-    guess_direction = guess_direction and not source.timed
-    if requested is None or guess_direction:
+    if requested is None:
         head, source.sent = head_of(source.sent)
-    if guess_direction and is_telemetry(head):
-        head = [msgspec.structs.replace(one, direction=UP) for one in head]
-        source.sent = (msgspec.structs.replace(one, direction=UP) for one in source.sent)
     return Layouts(requested, source, head, tell)

@@ -28,6 +28,7 @@ from miro_protocol.stream_line import FIRST_LINE, version_of
 from miro_protocol.table import FLAG_MEANINGS, SERVICE_DATA, TELEMETRY_FIELDS, VELOCITY, FrameType, Opcode
 from miro_protocol.transmission import Transmission, character_ticks
 from mirotwin.recording.capture.rows import DecodedRow, rows
+from mirotwin.recording.capture.source import Source
 
 SHOWN_BYTES = 16
 UNITS = {
@@ -192,8 +193,12 @@ def _packets(sent: Iterable[Transmission]) -> Iterator[Transmission]:
             yield Transmission(tick, transmission.direction, data, transmission.network)
 
 
-def to_stream(sent: Iterable[Transmission], layout: Callable[[int], int]) -> Iterator[bytes]:
+def to_stream(
+    sent: Iterable[Transmission], layout: Callable[[int], int], source: Source | None = None
+) -> Iterator[bytes]:
     """A line a transmission, with its content as comment. ConversionError for ticks that go backwards.
+
+    What `source` notes of itself follows the first line.
 
     The first line names the version, which is known after the last transmission: until then lines wait in a
     temporary file.
@@ -211,6 +216,8 @@ def to_stream(sent: Iterable[Transmission], layout: Callable[[int], int]) -> Ite
             comment = "; ".join(described(row) for row in rows([transmission], layout))
             lines.write(f"{stream.format_line(transmission, comment)}\n".encode())
         yield f"{FIRST_LINE.format(version)}\n".encode()
+        for note in source.notes if source else ():
+            yield f"# {note}\n".encode()
         lines.seek(0)
         while piece := lines.read(PIECE_BYTES):
             yield piece

@@ -1,29 +1,36 @@
-"""Opens a file of any format as transmissions."""
+"""Opens a file of any form as transmissions: the one door of all commands that read captures."""
 
 from __future__ import annotations
 
 import re
-from collections import Counter
 from collections.abc import Callable, Iterator
 
 import msgspec
 
 from miro_exact.clock import TICKS_PER_SECOND
 from miro_exact.inputs import InputError
-from miro_protocol import pcapng_reader, stream
+from miro_protocol import stream
 from miro_protocol.pcapng_reader import CaptureError
 from miro_protocol.stream import StreamError
 from miro_protocol.stream_header import Header
-from miro_protocol.transmission import DOWN, Transmission, character_ticks
+from miro_protocol.transmission import UP, Transmission, character_ticks
 from mirotwin.recording.capture import recorded
-from mirotwin.recording.capture.detect import TIMED
+from mirotwin.recording.capture.detect import detect
+from mirotwin.recording.capture.forms import FORMS, Form
+from mirotwin.recording.capture.heads import head_of, is_telemetry
 from mirotwin.recording.capture.hextext import HexError, HexText
 from mirotwin.recording.capture.input import Input
+from mirotwin.recording.capture.join import Joiner, moved_by
+from mirotwin.recording.capture.options import AS_IT_SAYS, DIRECTIONS, CaptureOptions
+from mirotwin.recording.capture.pieces import Facts, peeked
 from mirotwin.recording.container import RecordingError
 
 READ_ERRORS = (CaptureError, HexError, InputError, RecordingError, StreamError)
 """Errors of reading; everything that could be read comes before them."""
 LINE_BYTES = 16 << 20
+OWN = ("recording", "stream")
+"""Forms of ours, which are taken without a word."""
+_PACKETS = ("pcapng", "pcap")
 _ESCAPED = re.compile(r"[\udc80-\udcff]")
 
 
@@ -31,30 +38,107 @@ class Source(msgspec.Struct):
     """`sent` in the order of the file; `robots` (network -> 3 or 5) is what the file itself says about layouts."""
 
     label: str
-    format: str
+    form: Form
     sent: Iterator[Transmission]
     robots: dict[int, int]
+    facts: Facts
 
     @property
     def timed(self) -> bool:
         """Whether ticks are times; without them they only count characters."""
-        return self.format in TIMED
+        return self.form.timed
+
+    @property
+    def notes(self) -> list[str]:
+        """What a file that is made of it should say, once its first transmission was read."""
+        offset = self.facts.offset_s
+        return [f"of a {self.form.title}; {moved_by(offset)}"] if offset else []
 
 
-def open_source(given: Input, format: str, tell: Callable[[str], None], direction: str = DOWN) -> Source:
-    """`direction` is that of raw bytes and hex text, which do not say. Reading may raise one of `READ_ERRORS`.
+def form_of(given: Input, options: CaptureOptions, tell: Callable[[str], None]) -> Form:
+    """The form that the options name, else the one that is recognised. Raises InputError for a file in none."""
+    if options.from_form is not None:
+        return FORMS[options.from_form]
+    form, why, remedy = detect(given.peek())
+    if not form and given.path.endswith(".stream"):
+        return FORMS["stream"]  # which says what is wrong with it
+    if not form:
+        raise InputError(given.label, why, remedy)
+    if form not in OWN:
+        tell(f"{given.label}: read as {FORMS[form].title}, {why}")
+    return FORMS[form]
 
-    `tell` gets what the user should hear about what was passed over.
+
+def open_capture(
+    given: Input,
+    tell: Callable[[str], None],
+    options: CaptureOptions = AS_IT_SAYS,
+    form: Form | None = None,
+) -> Source:
+    """`form` None: as the options say, or as it is recognised. Reading may raise one of `READ_ERRORS`, and so may this.
+
+    `tell` gets what the user should hear: what the file was taken for, what was passed over, how times were moved.
     """
+    form = form or form_of(given, options, tell)
     robots: dict[int, int] = {}
-    if format == "pcapng":
-        return Source(given.label, format, _pcapng(given, tell), robots)
-    if format == "recording":
-        return Source(given.label, format, recorded.transmissions(given, robots, tell), robots)
-    if format == "stream":
-        return Source(given.label, format, _stream(given, tell), robots)
-    pieces = _raw(given) if format == "raw" else _hex(given)
-    return Source(given.label, format, _contiguous(pieces, direction), robots)
+    facts = Facts(given.label, tell, options.baud, options.wires)
+    if form.name == "recording":
+        return Source(given.label, form, recorded.transmissions(given, robots, tell), robots, facts)
+    if form.name == "stream":
+        return Source(given.label, form, _stream(given, tell), robots, facts)
+    if form.read is not None:
+        sent = Joiner(form.read(given, facts), facts).transmissions()
+    else:
+        sent = _contiguous(_raw(given) if form.name == "raw" else _hex(given))
+    return Source(given.label, form, _directed(sent, form, options.direction), robots, facts)
+
+
+def timed_capture(
+    given: Input,
+    tell: Callable[[str], None],
+    options: CaptureOptions = AS_IT_SAYS,
+    form: Form | None = None,
+) -> Source:
+    """The same for those who need times. Raises InputError for a form without times, unless they are assumed."""
+    source = open_capture(given, tell, options, form)
+    if not source.timed and not options.assume_contiguous:
+        remedy = "--assume-contiguous takes all characters to follow each other without a pause"
+        raise InputError(given.label, f"{source.form.title} without times", remedy)
+    return source
+
+
+def _directed(sent: Iterator[Transmission], form: Form, requested: str | None) -> Iterator[Transmission]:
+    """With directions and networks instead of wires, as the beginning looks.
+
+    A wire that does not say who sends carries what its beginning decodes as. Wires of both directions are one network.
+    """
+    head: list[Transmission]
+    first, sent = peeked(sent, 1)
+    if first and (requested or first[0].direction) and (form.name in _PACKETS or not form.timed):
+        head, everything = [], sent  # a pipe need not wait for a beginning
+    else:
+        head, everything = head_of(sent)
+    places: dict[int, tuple[str, int]] = {}
+    taken = dict.fromkeys(DIRECTIONS.values(), 0)
+    for wire in sorted({one.network for one in head}):
+        own = [one for one in head if one.network == wire]
+        silent = [one for one in own if not one.direction]
+        looks_up = requested is None and bool(silent) and is_telemetry(silent)
+        direction = UP if looks_up else DIRECTIONS[requested or "down"]
+        directions = {one.direction or direction for one in own}
+        places[wire] = direction, max(taken[each] for each in directions)
+        taken.update(dict.fromkeys(directions, places[wire][1] + 1))
+    usual = DIRECTIONS[requested or "down"]
+    for one in everything:
+        direction, network = places.get(one.network, (usual, one.network))
+        if one.direction and network == one.network:
+            yield one
+            continue
+        tick = one.tick
+        if not form.timed:  # it only counts characters
+            tick = tick // character_ticks("") * character_ticks(direction)
+        direction = one.direction or direction
+        yield msgspec.structs.replace(one, tick=tick, direction=direction, network=network)
 
 
 def _raw(given: Input) -> Iterator[bytes]:
@@ -69,21 +153,12 @@ def _hex(given: Input) -> Iterator[bytes]:
     text.finish()
 
 
-def _contiguous(pieces: Iterator[bytes], direction: str) -> Iterator[Transmission]:
-    step, count = character_ticks(direction), 0
+def _contiguous(pieces: Iterator[bytes]) -> Iterator[Transmission]:
+    step, count = character_ticks(""), 0
     for data in pieces:
         if data:
-            yield Transmission(count * step, direction, data)
+            yield Transmission(count * step, "", data)
             count += len(data)
-
-
-def _pcapng(given: Input, tell: Callable[[str], None]) -> Iterator[Transmission]:
-    passed_over: Counter[int] = Counter()
-    try:
-        yield from pcapng_reader.iterate(given.read, given.label, passed_over)
-    finally:
-        if passed_over:
-            tell(f"{given.label}: {pcapng_reader.events_line(passed_over)}")
 
 
 def _stream(given: Input, tell: Callable[[str], None]) -> Iterator[Transmission]:

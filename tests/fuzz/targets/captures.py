@@ -8,12 +8,12 @@ from miro_exact.bad_input import BadInput
 from miro_protocol import pcapng, stream
 from miro_protocol.pcapng_reader import CaptureError, events_line, iterate
 from mirotwin.recording.capture import render
-from mirotwin.recording.capture.detect import FORMATS, detect
+from mirotwin.recording.capture.forms import FORMS
 from mirotwin.recording.capture.hextext import HexError, HexText
 from mirotwin.recording.capture.input import Input
 from mirotwin.recording.capture.layout import robots_in
 from mirotwin.recording.capture.rows import rows
-from mirotwin.recording.capture.source import READ_ERRORS, open_source
+from mirotwin.recording.capture.source import READ_ERRORS, open_capture
 from tests.fuzz.target import Target, always, folder, pieces, refused
 
 _SOURCE = "fuzz.stream"
@@ -90,15 +90,15 @@ def _capture(data):
     path.write_bytes(data)
     said = []
     with Input(str(path)) as given:
-        format, about = detect(given.peek())
-        assert about.isprintable()
-        format = FORMATS[forced % len(FORMATS)] if forced < 2 * len(FORMATS) else format
+        form = [*FORMS.values()][forced % len(FORMS)] if forced < 2 * len(FORMS) else None
         outcome, sent = "taken", []
-        source = open_source(given, format, said.append)
         try:
+            source = open_capture(given, said.append, form=form)
             sent += islice(source.sent, _MOST)
         except READ_ERRORS as error:
             outcome = refused(error)
+            if not sent:
+                return outcome
     assert all(line.isprintable() for line in said), said
     layouts = {one.network: robots_in(sent, one.network)[0] for one in sent}
     for row in rows(sent, layouts.__getitem__):
@@ -110,7 +110,7 @@ def _capture(data):
                 pass
     except BadInput as error:
         outcome += f", {refused(error)}"
-    return f"{format}: {outcome}"
+    return f"{source.form.name}: {outcome}"
 
 
 STREAM_WORDS = (

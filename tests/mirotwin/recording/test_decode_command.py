@@ -43,7 +43,8 @@ def as_json(data, *options):
 @pytest.mark.parametrize("data", [DOWN, DOWN.hex().encode(), b", ".join(b"0x%02x" % byte for byte in DOWN)])
 def test_bytes_without_times_are_told_by_their_offsets(data):
     code, lines, err = decode(data)
-    assert (code, err) == (0, "")
+    assert code == 0
+    assert re.fullmatch(r"mirotwin: standard input: read as (raw bytes|hex text), .*\n", err)
     assert lines[0].endswith(", network 0 of 3 robots")
     columns = [line.split(maxsplit=6) for line in lines[3:-1]]
     assert [column[0] for column in columns] == ["0", "23", "46"]
@@ -59,7 +60,8 @@ def test_bytes_without_times_are_told_by_their_offsets(data):
 @pytest.mark.parametrize("data", [PCAPNG, STREAM])
 def test_captures_with_times_and_both_directions_are_told_by_their_ticks(data):
     code, found, err = as_json(data)
-    assert (code, err) == (0, "")
+    assert code == 0
+    assert err in ("", "mirotwin: standard input: read as pcapng capture, its first bytes are those of one\n")
     first, *rows, last = found
     assert (first["event"], first["timed"]) == ("input", True)
     assert [(row["tick"], row["direction"]) for row in rows] == [sent[:2] for sent in SENT]
@@ -93,7 +95,7 @@ def test_repeated_numbers_are_stale():
 def test_the_layout_is_that_in_which_frames_can_be_read_unless_it_is_said(n):
     wire = encode(TeamFrame(0, 1, ((1, 2),) * n), n)
     assert as_json(wire)[1][1]["event"] == "frame"
-    code, found, err = as_json(wire, "--robots", str(8 - n))
+    code, found, err = as_json(wire, "--robots", str(8 - n), "--from-form", "raw")
     assert (code, err) == (0, "")
     assert found[1]["event"] == "damage"
 
@@ -103,7 +105,7 @@ def test_a_layout_that_cannot_be_told_is_said_to_be_a_guess():
     both = TEAM + encode(TeamFrame(0, 2, ((1, 2),) * 5), 5) * 2
     found = "1 frame of 3 robots and 2 frames of 5 robots at the beginning; 5 robots assumed"
     assert found in decode(both)[2]
-    assert decode(both, "--robots", "3", "--direction", "down")[2] == ""
+    assert "assumed" not in decode(both, "--robots", "3", "--direction", "down")[2]
 
 
 def test_raw_telemetry_is_found_to_come_from_a_robot():
@@ -115,16 +117,20 @@ def test_raw_telemetry_is_found_to_come_from_a_robot():
 @settings(max_examples=50)
 @given(st.binary(max_size=200))
 def test_every_byte_is_in_exactly_one_row(data):
-    code, found, _ = as_json(data, "--format", "raw")
+    code, found, _ = as_json(data, "--from-form", "raw")
     pieces = [bytes.fromhex(row["data"]) for row in found[1:-1]]
     assert (code, b"".join(pieces)) == (0, data)
     assert [row["offset"] for row in found[1:-1]] == list(accumulate(map(len, pieces), initial=0))[:-1]
 
 
-def test_plain_text_is_taken_for_bytes_with_a_word_about_it():
+def test_plain_text_is_taken_for_bytes_only_where_that_is_said():
     code, lines, err = decode(b"hello world, how are you?")
+    assert (code, lines) == (2, [])
+    assert (
+        "standard input: is text in no form that is known; name it with --from-form, or take it as raw" in err
+    )
+    code, lines, _ = decode(b"hello world, how are you?", "--from-form", "raw")
     assert code == 0
-    assert "standard input: is text, but neither pairs of hex digits nor a stream file" in err
     assert "25 bytes: 68 65 6c" in lines[3]
 
 
@@ -133,12 +139,12 @@ def test_plain_text_is_taken_for_bytes_with_a_word_about_it():
     [
         (PCAPNG[:-3], (), 3, "offset 324: the file ends in the middle of a block"),
         (PCAPNG + b"\0" * 12, (), 4, "damaged block: length 0"),
-        (b"\xd4\xc3\xb2\xa1" + bytes(20), (), 0, "offset 0: a capture in the old pcap format; convert it with"),
+        (b"\xd4\xc3\xb2\xa1" + bytes(30), (), 0, "offset 24: the file ends in the middle of a packet"),
         (STREAM + b"5000000 > 5g\n", (), 4, "standard input:6:11: '5g' is not a character"),
         (STREAM + b"5000000 > \xff\n", (), 4, "standard input:6:11: byte ffh is not UTF-8"),
-        (DOWN.hex(" ").encode() + b"\nxy", ("--format", "hex"), 3, "standard input:2:1: 'x' is no hex digit"),
-        (DOWN, ("--format", "pcapng"), 0, "offset 0: not a pcapng file"),
-        (DOWN, ("--format", "recording"), 0, "offset 0: not an MCAP file"),
+        (DOWN.hex(" ").encode() + b"\nxy", ("--from-form", "hex"), 3, "standard input:2:1: 'x' is no hex digit"),
+        (DOWN, ("--from-form", "pcapng"), 0, "offset 0: not a pcapng file"),
+        (DOWN, ("--from-form", "recording"), 0, "offset 0: not an MCAP file"),
         (b"\x89MCAP0\r\n\1\2", (), 0, "offset 8: the file ends in the middle of a record"),
     ],
 )  # fmt: skip
@@ -180,7 +186,7 @@ def test_no_such_file_and_devices_are_refused(tmp_path):
 
 
 def test_it_works_in_a_pipe_and_shows_a_frame_before_the_input_ends():
-    options = ("--json", "--format", "raw", "--robots", "3", "--direction", "down")
+    options = ("--json", "--from-form", "raw", "--robots", "3", "--direction", "down")
     command = [*COMMAND, "decode", "-", *options]
     with children.start(command, stdin=subprocess.PIPE, stdout=subprocess.PIPE) as process:
         process.stdin.write(TEAM)
@@ -204,7 +210,7 @@ def test_packets_of_unknown_events_are_counted_on_stderr(tmp_path, command, argu
     path.write_bytes(odd[: len(odd) - cut])
     code, _, err = mirotwin(command, path, *arguments)
     assert code == (2 if cut else 0)
-    passed = "passed over 1 packet of other events than data sent or received: 1 of unknown event"
+    passed = "passed over 1 packet other than data sent or received: 1 of unknown event"
     assert f"{path}: {passed}" in err
 
 
@@ -215,7 +221,9 @@ def test_a_file_whose_name_is_no_utf_8_is_decoded(tmp_path, arguments, encoding)
     with open(name, "wb") as file:
         file.write(DOWN.hex().encode())
     strictly = {**os.environ, "PYTHONIOENCODING": f"{encoding}:strict"}
-    found = children.run([*COMMAND, "decode", name, *arguments], env=strictly, capture_output=True)
+    found = children.run(
+        [*COMMAND, "decode", name, "--from-form", "hex", *arguments], env=strictly, capture_output=True
+    )
     assert (found.returncode, found.stderr) == (0, b"")
     assert b"odd" in found.stdout.splitlines()[0]
 

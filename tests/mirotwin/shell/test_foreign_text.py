@@ -62,7 +62,7 @@ def test_an_lcov_name_with_codes_is_shown_escaped_and_kept_exactly(mirotwin, ima
 def test_a_line_end_in_the_name_of_a_file_forges_no_line(mirotwin, image, tmp_path):
     raw = tmp_path / FORGED
     raw.write_bytes(b"\x00")
-    for arguments in (["decode", raw, "--format", "raw"], ["decode", raw, "--format", "raw", "--json"]):
+    for arguments in (["decode", raw, "--from-form", "raw"], ["decode", raw, "--from-form", "raw", "--json"]):
         out = mirotwin(*arguments)[1]
         assert not any(line.startswith("all") for line in out.splitlines())
     vcd = tmp_path / f"{FORGED}.vcd"

@@ -1,4 +1,4 @@
-"""Formats are told from the first bytes; hex text has digits in any usual dress, cut anywhere."""
+"""Forms are told from the beginning of a file; hex text has digits in any usual dress, cut anywhere."""
 
 import gzip
 import re
@@ -12,7 +12,8 @@ from hypothesis import strategies as st
 from miro_protocol import stream
 from miro_protocol.pcapng import render
 from miro_protocol.transmission import Transmission
-from mirotwin.recording.capture.detect import FORMATS, detect
+from mirotwin.recording.capture.detect import detect
+from mirotwin.recording.capture.forms import FORMS
 from mirotwin.recording.capture.hextext import HexError, HexText
 from mirotwin.recording.capture.input import HEAD_BYTES
 
@@ -34,7 +35,7 @@ from mirotwin.recording.capture.input import HEAD_BYTES
         (b"# mirotwin stream 1\n", "stream"),
         (b"\xef\xbb\xbf# mirotwin stream 1\n", "stream"),
         (render([Transmission(0, ">", b"a")]), "pcapng"),
-        (b"\xd4\xc3\xb2\xa1", "pcapng"),
+        (b"\xd4\xc3\xb2\xa1", "pcap"),
         (b"\x89MCAP0\r\n", "recording"),
         (b"\x89MCA", "recording"),
         (b"\x89MC", "raw"),
@@ -44,25 +45,25 @@ from mirotwin.recording.capture.input import HEAD_BYTES
     ],
 )
 def test_the_beginning_tells_the_format(head, format):
-    assert detect(head) == (format, "")
+    assert detect(head).form == format
 
 
 @pytest.mark.parametrize(
-    "text", [b"hello", b"55 5", b"# only a comment", b"12 | 55", b"   \n", b"\xef\xbb\xbfhello"]
+    "text",
+    [b"hello", b"55 5", b"# only a comment", b"12 | 55", b"   \n", b"\xef\xbb\xbfhello", b"\xff\xfeh\0i\0"],
 )
-def test_text_that_is_neither_hex_nor_a_stream_is_raw_and_said_to_be(text):
-    format, note = detect(text)
-    assert format == "raw"
-    assert "neither pairs of hex digits nor a stream file; read as raw bytes" in note
+def test_text_in_no_known_form_is_not_taken_for_bytes(text):
+    remedy = "name it with --from-form, or take it as raw"
+    assert detect(text) == ("", "is text in no form that is known", remedy)
 
 
-def test_a_packed_file_is_read_as_raw_bytes_and_said_to_be_packed():
-    assert detect(gzip.compress(b"x")) == ("raw", "looks packed by gzip, unpack it first; read as raw bytes")
+def test_a_packed_file_is_said_to_be_packed():
+    assert detect(gzip.compress(b"x"))[:2] == ("", "is packed by gzip")
 
 
 @given(st.binary(max_size=300))
 def test_any_bytes_have_a_format(head):
-    assert detect(head)[0] in FORMATS
+    assert detect(head).form in ("", *FORMS)
 
 
 @given(
@@ -70,16 +71,15 @@ def test_any_bytes_have_a_format(head):
 )
 def test_what_the_library_writes_as_a_stream_is_a_stream(sent):
     text = stream.format_stream(sent)
-    assert detect(text.encode())[0] == "stream"
-    assert detect(text.partition("\n")[2].encode())[0] == "stream"
+    assert detect(text.encode()).form == "stream"
+    assert detect(text.partition("\n")[2].encode()).form == "stream"
 
 
-def test_the_specification_names_the_formats_in_the_order_in_which_they_are_tried():
+def test_the_specification_names_all_forms():
     page = (Path(__file__).parents[4] / "protocol/README.md").read_text(encoding="utf-8")
     table = page.partition("| it begins with | taken for |")[2].partition("\n\n")[0]
-    named = [row.split("|")[-2].strip() for row in table.splitlines()[2:]]
-    assert named == ["pcapng", "recording", "stream", "hex", "raw"]
-    assert sorted(named) == sorted(FORMATS)
+    named = [name for row in table.splitlines()[2:] for name in row.split("|")[-2].strip().split(", ")]
+    assert sorted(named) == sorted(FORMS)
 
 
 BOM = "\ufeff"

@@ -18,10 +18,10 @@ from miro_sim.periods import Period
 from miro_sim.scenario.file import load
 from miro_sim.world.world import World
 from mirotwin.recording.capture import recorded
-from mirotwin.recording.capture.detect import FORMATS
+from mirotwin.recording.capture.forms import FORMS
 from mirotwin.recording.capture.input import Input
 from mirotwin.recording.capture.rows import DecodedRow, rows
-from mirotwin.recording.capture.source import READ_ERRORS, open_source
+from mirotwin.recording.capture.source import READ_ERRORS, open_capture
 from mirotwin.recording.container import RecordingError
 from mirotwin.recording.reader import parse
 from mirotwin.recording.recorder import Recorder, RunSource
@@ -216,7 +216,7 @@ def decoded_file(path, format):
     found = []
     with Input(str(path)) as given:
         try:
-            for row in rows(open_source(given, format, print).sent, lambda network: 3):
+            for row in rows(open_capture(given, print, form=FORMS[format]).sent, lambda network: 3):
                 found.append(row)
         except READ_ERRORS as error:
             return found, error
@@ -227,7 +227,7 @@ def decoded_file(path, format):
 @given(
     st.binary(max_size=200),
     st.sampled_from([b"", b"\x89MCAP0\r\n", b"\x0a\x0d\x0d\x0a"]),
-    st.sampled_from(FORMATS),
+    st.sampled_from([*FORMS]),
 )
 def test_any_bytes_in_any_format_give_rows_and_at_most_the_formats_own_error(
     tmp_path_factory, data, magic, format
@@ -284,7 +284,7 @@ def test_memory_does_not_grow_with_the_input(tmp_path):
     path.write_bytes(bytes(range(256)) * (1 << 14))  # 4 MiB
     with Input(str(path)) as given:
         tracemalloc.start()
-        for _ in rows(open_source(given, "raw", print).sent, lambda network: 3):
+        for _ in rows(open_capture(given, print, form=FORMS["raw"]).sent, lambda network: 3):
             pass
         peak = tracemalloc.get_traced_memory()[1]
         tracemalloc.stop()

@@ -1,0 +1,53 @@
+"""The first transmissions of a source, and what they look like."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Iterator, Sequence
+
+from miro_exact.bad_input import BadInput
+from miro_protocol.table import ROBOT_COUNTS
+from miro_protocol.transmission import Transmission
+
+HEAD_CHARACTERS = 1 << 16
+
+
+def head_of(sent: Iterator[Transmission]) -> tuple[list[Transmission], Iterator[Transmission]]:
+    """The first transmissions, and an iterator over all; an error comes in its place."""
+    head: list[Transmission] = []
+    size = 0
+    failure: Exception | None = None
+    try:
+        while size < HEAD_CHARACTERS and (transmission := next(sent, None)) is not None:
+            head.append(transmission)
+            size += len(transmission.data)
+    except BadInput as error:
+        failure = error
+
+    def everything() -> Iterator[Transmission]:
+        yield from head
+        if failure is not None:
+            raise failure
+        yield from sent
+
+    return head, everything()
+
+
+def frame_counts(sent: Iterable[Transmission]) -> dict[int, int]:
+    """Valid frames from a host in each layout, 3 and 5."""
+    from miro_protocol.decoder import Decoder  # a hot module: not before the engine was chosen
+
+    decoders = {count: Decoder(count) for count in ROBOT_COUNTS}
+    for transmission in sent:
+        for decoder in decoders.values():
+            decoder.hear(transmission)
+    return {count: decoder.valid for count, decoder in decoders.items()}
+
+
+def is_telemetry(head: Sequence[Transmission]) -> bool:
+    """Whether raw bytes read as robots' answers rather than as a host's frames."""
+    from miro_protocol.decoder import TelemetryDecoder
+
+    decoder = TelemetryDecoder()
+    for transmission in head:
+        decoder.hear(transmission)
+    return decoder.valid > max(frame_counts(head).values())

@@ -1,0 +1,56 @@
+"""Options of all commands that read captures."""
+
+from __future__ import annotations
+
+from typing import Annotated
+
+import click
+
+from miro_protocol.transmission import DOWN, UP
+from mirotwin.recording.capture.forms import FORMS
+from mirotwin.shell.command import Option, Options
+from mirotwin.shell.options import Whole
+
+DIRECTIONS = {"down": DOWN, "up": UP}
+
+
+class CaptureOptions(Options, frozen=True, kw_only=True):
+    """How a capture is read, where it does not say."""
+
+    HEADING = "A capture"
+    from_form: Annotated[
+        str | None,
+        Option(
+            type=click.Choice([*FORMS]),
+            metavar="FORM",
+            help="Its form. Default: recognised by its beginning.",
+        ),
+    ] = None
+    direction: Annotated[
+        str | None,
+        Option(
+            type=click.Choice([*DIRECTIONS]),
+            help="Where it does not say who sent: down to the robots (default, unless it decodes as telemetry), or up.",
+        ),
+    ] = None
+    baud: Annotated[
+        int | None,
+        Option(
+            type=Whole(50, 10_000_000),
+            metavar="BAUD",
+            help="Of the sender. Default: fitted, else the line's 9600.",
+        ),
+    ] = None
+    wires: Annotated[
+        tuple[str, ...],
+        Option(
+            "--wire", metavar="NAME", help="Only this channel of an analyser. Default: all with characters."
+        ),
+    ] = ()
+    assume_contiguous: Annotated[
+        bool,
+        Option(help="Without times: all characters follow each other without a pause, from tick 0 on."),
+    ] = False
+
+
+AS_IT_SAYS = CaptureOptions()
