@@ -56,7 +56,8 @@ def refused(folder, *words):
     )
     assert done.returncode == 2, (done.returncode, done.stderr)
     assert "Traceback" not in done.stderr
-    (line,) = done.stderr.splitlines()
+    *before, line = done.stderr.splitlines()
+    assert all(": read as " in one for one in before)
     return line
 
 
