@@ -2,10 +2,10 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from functools import partial
 from pathlib import Path
-from typing import Annotated
+from typing import TYPE_CHECKING, Annotated
 
 import click
 from msgspec.structs import replace
@@ -19,10 +19,11 @@ from mirotwin.replay.difference import ComparedRun, RunDifference, compare_runs
 from mirotwin.replay.lockstep.annotated_image import annotated_of
 from mirotwin.replay.options import CompareOptions, check_reaches, extent, refuse_given, rule_as_json
 from mirotwin.replay.text import SHOWN, difference_lines, difference_tables, frame_tables, response_table
+from mirotwin.report.page.link import LinkLog
 from mirotwin.runs.job import Job, load_job
 from mirotwin.runs.result import Result, expectations_text
 from mirotwin.runs.run import Run
-from mirotwin.shell.command import command_of
+from mirotwin.shell.command import command_line, command_of, operand
 from mirotwin.shell.console import show
 from mirotwin.shell.debug_files import LinesFrom, SourceFolders, checked_sources, load_images
 from mirotwin.shell.json_text import print_json
@@ -35,6 +36,9 @@ from mirotwin.verify.cases.artifacts import CASES
 from mirotwin.verify.cases.replay_line import CaseOptions, debug_line, foreign_path
 from mirotwin.verify.checks.expect import says_anything
 from mirotwin.verify.expectations import as_settings, in_files
+
+if TYPE_CHECKING:
+    from miro_sim.world.world import World  # a hot module: not before the engine was chosen
 
 _OF_A_RECORDING = ("kind", "within_ms", "within_counts", "within_counts_per_sample", "from_time")
 _OF_THE_WORLD = (*_OF_A_RECORDING, "seed", "settings", "expected")
@@ -56,9 +60,12 @@ class ReplayOptions(CaseOptions, frozen=True, kw_only=True):
     desk: DeskOptions = DeskOptions()
     capture: CaptureOptions = CaptureOptions()
     out: Annotated[
-        Path | None, OUT.saying("Folder of the recording. Default: runs/FILE-port.", heading=AT_PORT)
+        Path | None,
+        OUT.saying(
+            "Folder for a recording of what the robots do. Default with --port: runs/FILE-port, else none."
+        ),
     ] = None
-    force: Annotated[bool, FORCE.saying("Replace a recording in the folder.", heading=AT_PORT)] = False
+    force: Annotated[bool, FORCE.saying("Replace a recording in the folder.")] = False
     engine: Engine = None
     everything: Annotated[
         bool,
@@ -105,10 +112,12 @@ def replay(options: ReplayOptions) -> int:
     twin answers to the same bytes at the same times (--compare answers). A recording made at a port is compared so,
     too. Nothing that moves a robot is sent without --allow-motion.
 
-    The list shows the host's frames as sent, before the radio, and the robots' answers as the PC received them.
+    The list shows the host's frames as sent, before the radio, what became of each at the robots (fresh, stale,
+    damaged, lost, ignored), where their failsafe stopped them, and their answers as the PC received them. What is not
+    fresh is listed first; --all lists everything. With --out the run is recorded: `mirotwin report` makes its page.
     """
-    if not options.desk.port and (given := options.given("out", "force")):
-        raise click.UsageError(f"{given[0]} needs --port.")
+    if options.force and options.out is None and not options.desk.port:
+        raise click.UsageError("--force needs --out or --port.")
     file = file_in(options.file, (*RECORDINGS, *CASES))
     options.plugins.bring()
     job, images = _loaded(file, options)
@@ -119,6 +128,10 @@ def replay(options: ReplayOptions) -> int:
     if options.compare.kind == "answers":
         reason = "is for robots at a port, and this was recorded at none"
         raise BadInput(file, "--compare answers", reason, "give --port, or another comparison")
+    if job.case.verdict or job.alone:
+        refuse_given(
+            file, "is for a stream, a capture or a recording of robots", options.given("out", "force")
+        )
     if job.case.verdict or (job.alone and not job.recorded):
         return _replay_case(job, options)
     return _compare_with_recorded(job, images, options)
@@ -176,7 +189,12 @@ def _compare_with_recorded(job: Job, images: Sequence[Image], options: ReplayOpt
     if job.recorded:
         check_reaches(rule, job.spec.origin, job.recorded)
     recorded = [period for period in job.recorded if to_tick is None or period.tick < to_tick]
-    again = _rerun(job, to_tick, not options.shows)
+    folder = None if options.out is None else OutputFolder(options.out, options.force, (RECORDING,))
+    air: list[LinkLog] = []
+    listens = options.shows and not job.alone
+    again = _rerun(
+        job, to_tick, not options.shows, (lambda world: air.append(LinkLog(world))) if listens else None
+    )
     difference = compare_runs(
         ComparedRun(recorded, [job.as_recorded] if job.image and job.as_recorded else []),
         ComparedRun(again.periods, [job.spec]),
@@ -190,7 +208,7 @@ def _compare_with_recorded(job: Job, images: Sequence[Image], options: ReplayOpt
     ended = len(again.periods) < len(recorded)
     if options.shows:
         if not job.alone:
-            show(*frame_tables(job, again.periods, options.everything, to_tick))
+            show(*frame_tables(job, again.periods, options.everything, to_tick, air[0].marks()))
         show(*difference_tables(difference, options.everything))
     if not job.recorded and not compare.as_json:
         show(response_table(again.periods))
@@ -198,6 +216,12 @@ def _compare_with_recorded(job: Job, images: Sequence[Image], options: ReplayOpt
     if options.shows and says_anything(job.spec.scenario):
         show(expectations_text(result.expectations))
     complain(*difference_lines(difference, "the replay differs"), *difference.notes)
+    if folder is not None:
+        again.write(folder)
+        if not compare.as_json:
+            show(
+                f"{folder.path / RECORDING}: `{command_line('report', operand(f'{folder.path}'))}` makes its page"
+            )
     if difference.differences and options.shows:
         first_tick = difference.differences[0].tick
         show(debug_line(job.spec.origin, options.firmware, first_tick, plugins=options.plugins))
@@ -222,7 +246,7 @@ def _compare_with_recorded(job: Job, images: Sequence[Image], options: ReplayOpt
     return code
 
 
-def _rerun(job: Job, to_tick: int | None, quiet: bool) -> Run:
+def _rerun(job: Job, to_tick: int | None, quiet: bool, watch: Callable[[World], object] | None) -> Run:
     """All of it, or the control periods that begin before `to_tick`; a stream to that tick.
 
     Its checks end there, and its world with the control period, so that all frames are listed.
@@ -234,7 +258,7 @@ def _rerun(job: Job, to_tick: int | None, quiet: bool) -> Run:
     elif to_tick is not None:
         end_tick = min(to_tick, job.case.end_tick or to_tick)
     with ProgressBar("replaying", end_tick, quiet) as bar:
-        again = job.run(end_tick, bar.to, cut=to_tick is not None)
+        again = job.run(end_tick, bar.to, to_tick is not None, watch or (lambda world: None))
     if again.world.in_period and not again.world.stopped:
         again.world.run_to(again.world.period_end)
     return again

@@ -2,15 +2,20 @@
 
 from __future__ import annotations
 
+import math
+from bisect import bisect_right
+from collections import Counter
 from collections.abc import Iterator, Sequence
+from operator import attrgetter
+from typing import NamedTuple
 
 from rich.table import Table
 
 from miro_exact.bad_input import amount
-from miro_exact.clock import seconds
-from miro_protocol.events import Damaged
+from miro_exact.clock import seconds, ticks
+from miro_protocol.events import Damaged, Reason
 from miro_protocol.frames import TeamFrame, TelemetryFrame
-from miro_protocol.transmission import DOWN
+from miro_protocol.transmission import DOWN, Transmission
 from miro_sim.periods import Period
 from mirotwin.recording.capture.recorded import transmissions_of
 from mirotwin.recording.capture.render import SHOWN_BYTES, described
@@ -20,6 +25,7 @@ from mirotwin.replay.difference import RunDifference
 from mirotwin.replay.lockstep.firmwares import FirmwareDifference
 from mirotwin.replay.lockstep.instructions import InstructionDifference
 from mirotwin.replay.lockstep.variables import VariableDifference
+from mirotwin.report.page.link import STOPS, LinkMark
 from mirotwin.runs.job import Job
 from mirotwin.runs.made_from import SourceDifference
 from mirotwin.shell.console import plain_table
@@ -115,40 +121,132 @@ def _place(difference: InstructionDifference | VariableDifference, runs: RunDiff
 
 SHOWN = 20
 """Frames in the list unless all are requested."""
+FATES = {"fresh": "fresh", "repeated": "stale", "damaged": "damaged", "lost": "lost", "open": "under way"}
+"""The result of a frame at a robot, by the kind of its mark."""
+IGNORED = "ignored"
+
+
+class Line(NamedTuple):
+    """A line of the list of frames. `fate`: of a frame from a host, at the robots; `special`: it is always listed."""
+
+    tick: int
+    direction: str
+    sender: str
+    text: str
+    fate: str
+    special: bool
+
+
+class Fates:
+    """The result at each robot of what hosts `sent`, from the marks of the air."""
+
+    def __init__(
+        self, sent: Sequence[Transmission], marks: Sequence[LinkMark], delays: Sequence[int]
+    ) -> None:
+        self._kinds: dict[tuple[int, int], dict[int, str]] = {}
+        self._ticks: dict[int, list[int]] = {}
+        for one in sent:
+            self._ticks.setdefault(one.network, []).append(one.tick)
+        for mark in marks:
+            if mark.robot is not None and mark.kind in FATES:
+                network, slot = mark.robot
+                kinds = self._kinds.setdefault((network, mark.start_tick - delays[network]), {})
+                kinds[slot] = FATES[mark.kind]
+
+    def of(self, row: DecodedRow) -> str:
+        """In a word, or robot by robot where it is not the same for all."""
+        if isinstance(row.event, Damaged):
+            return IGNORED if row.event.reason in (Reason.NO_SYNC, Reason.CUT_SHORT) else "damaged"
+        ticks = self._ticks[row.network]
+        tick = ticks[bisect_right(ticks, row.event.start_tick) - 1]
+        by_robot = self._kinds.get((row.network, tick), {})
+        words = set(by_robot.values())
+        if len(words) > 1:
+            return ", ".join(f"{word} at {slot}" for slot, word in by_robot.items())
+        return words.pop() if words else ""
+
+
+def stop_lines(marks: Sequence[LinkMark], several: bool) -> list[Line]:
+    """Where the failsafe stopped robots; those that it stopped alike in one line."""
+    alike: dict[tuple[int, int, str], list[str]] = {}
+    for mark in marks:
+        if mark.robot is not None and mark.kind in STOPS:
+            network, slot = mark.robot
+            alike.setdefault((mark.start_tick, network, f"failsafe: {mark.text}"), []).append(f"{slot}")
+    return [
+        Line(
+            tick,
+            "",
+            f"{f'net{network} ' if several else ''}robot{'s' * (len(robots) > 1)} {', '.join(robots)}",
+            text,
+            "",
+            True,
+        )
+        for (tick, network, text), robots in alike.items()
+    ]
 
 
 def frame_tables(
-    job: Job, replayed: Sequence[Period], everything: bool, to_tick: int | None
+    job: Job, replayed: Sequence[Period], everything: bool, to_tick: int | None, marks: Sequence[LinkMark]
 ) -> Iterator[Table | str]:
-    """The frames up to `to_tick` (None: all) that were recorded, of a stream those that were sent."""
-    robots = {index: network.robots for index, network in enumerate(job.spec.robot_scenario.networks)}
-    decoded = sorted(
-        rows(transmissions_of(job.recorded or replayed), robots.__getitem__),
-        key=lambda row: row.event.start_tick,
-    )
-    if to_tick is not None:
-        decoded = [row for row in decoded if row.event.start_tick < to_tick]
-    listed = decoded if everything else decoded[:SHOWN]
-    table = plain_table("tick", "t [s]", justify="right")
-    table.add_column("")
-    table.add_column("from")
-    table.add_column("frame")
-    for row in listed:
+    """The frames up to `to_tick` (None: all) that were recorded, of a stream those that were sent; `marks`: of the air,
+    which say what became of them, and where the failsafe stopped a robot.
+    """
+    networks = job.spec.robot_scenario.networks
+    sent = transmissions_of(job.recorded or replayed)
+    delays = [ticks(network.radio.latency_s) for network in networks]
+    fates = Fates([one for one in sent if one.direction == DOWN], marks, delays)
+    several = len(networks) > 1
+    frames = []
+    for row in rows(sent, lambda network: networks[network].robots):
         sender = "host" if row.direction == DOWN else "robot ?"
         if isinstance(row.message, TelemetryFrame):
             sender = f"robot {row.message.slot}"
-        if len(robots) > 1:
-            sender = f"net{row.network} {sender}"
-        tick = row.event.start_tick
-        table.add_row(str(tick), f"{seconds(tick):.4f}", row.direction, sender, frame_text(row))
+        fate = fates.of(row) if row.direction == DOWN else ""
+        special = fate not in ("", "fresh")
+        place = f"net{row.network} {sender}" if several else sender
+        frames.append(Line(row.event.start_tick, row.direction, place, frame_text(row), fate, special))
+    frames = sorted(_before(frames, to_tick), key=attrgetter("tick"))
+    stops = _before(stop_lines(marks, several), to_tick)
+    listed = frames if everything else _listed(frames)
+    table = plain_table("tick", "t [s]", justify="right")
+    for name in ("", "from", "frame", "at the robots"):
+        table.add_column(name)
+    for line in sorted([*listed, *(stops if everything else stops[:SHOWN])], key=attrgetter("tick")):
+        table.add_row(f"{line.tick}", f"{seconds(line.tick):.4f}", *line[1:5])
     yield table
-    if len(listed) < len(decoded):
-        yield f"{len(decoded) - len(listed)} more of {len(decoded)} frames; --all lists them"
+    if len(listed) < len(frames):
+        yield f"{len(frames) - len(listed)} more of {len(frames)} frames; --all lists them"
+    counts = Counter(line.fate for line in frames if line.fate)
+    if counts:
+        yield f"from the host: {', '.join(f'{count} {fate}' for fate, count in counts.most_common())}"
+    if stops:
+        yield f"the failsafe acted {amount(len(stops), 'time')}, first at {seconds(stops[0].tick):.4f} s"
+
+
+def _before(lines: Sequence[Line], to_tick: int | None) -> list[Line]:
+    return [line for line in lines if to_tick is None or line.tick < to_tick]
+
+
+def _listed(frames: Sequence[Line]) -> list[Line]:
+    """The first that are not fresh, and as many of the others as there is room for, in the order of time."""
+    special = [line for line in frames if line.special][:SHOWN]
+    usual = [line for line in frames if not line.special][: SHOWN - len(special)]
+    return sorted([*special, *usual], key=attrgetter("tick"))
 
 
 def response_table(replayed: Sequence[Period]) -> Table:
     """How the robots reacted to a stream: there is no recording to compare with."""
-    names = ("robot", "accepted", "rejected", "stale", "commands", "left [counts]", "right [counts]")
+    names = (
+        "robot",
+        "accepted",
+        "rejected",
+        "stale",
+        "commands",
+        "left [counts]",
+        "right [counts]",
+        "moved [cm]",
+    )
     table = plain_table(*names, justify="right")
     for index, robot in enumerate(replayed[-1].robots):
         records = [period.robots[index] for period in replayed]
@@ -158,7 +256,9 @@ def response_table(replayed: Sequence[Period]) -> Table:
             for count in (robot.accepted, robot.rejected, robot.stale)
         ]
         positions = (str(robot.left.real_position), str(robot.right.real_position))
-        table.add_row(f"{robot.slot}", *counters, str(commands), *positions)
+        begin, end = records[0].truth, robot.truth
+        moved_cm = 100.0 * math.hypot(end.x_m - begin.x_m, end.y_m - begin.y_m)
+        table.add_row(f"{robot.slot}", *counters, str(commands), *positions, f"{moved_cm:.2f}")
     return table
 
 

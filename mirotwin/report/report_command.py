@@ -221,7 +221,7 @@ def _of_case(wanted: ReportOptions, job: Job, name: str) -> Material:
     report = Path(job.spec.origin).with_name(REPORT)
     text = read_input(report).decode("utf-8", "replace") if report.is_file() else ""
     return Material(
-        kind="failed test" if text else "case",
+        kind="failed test" if text else "case" if job.case.verdict else "stream file",
         job=job,
         again=again,
         periods=[period for period in again.periods if period.index in shown],

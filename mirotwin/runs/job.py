@@ -6,7 +6,7 @@ import copy
 import re
 from collections.abc import Callable, Iterable, Sequence
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import msgspec
 from msgspec.structs import replace
@@ -58,7 +58,11 @@ from mirotwin.shell.verdicts import judge
 from mirotwin.verify.cases.artifacts import image_beside
 from mirotwin.verify.checks.expect import expectations_in, expectations_of
 
+if TYPE_CHECKING:
+    from miro_sim.world.world import World  # a hot module: not before the engine was chosen
+
 DEFAULT_SCENARIO = "fig6"
+OF_STREAM = "What was sent, over an ideal link to robots that stand"
 AFTERMATH_TICKS = TICKS_PER_SECOND
 LONGEST_TICKS = 86_400 * TICKS_PER_SECOND
 
@@ -174,13 +178,14 @@ def _default_scenario(script: Sequence[ScriptItem]) -> Scenario:
         robots = robots_of_stream(one for one in script if one.network == index)
         network = NetworkSpec(
             robots=5 if robots == 5 else 3,
+            host="silent",
             radio=Radio(bit_error_rate=0.0, carrier="on", squelch=True),
             robot=tuple(replace(model, slot=slot) for slot in range(robots)),
         )
         networks.append(network)
     periods = -(-end_tick // CONTROL_PERIOD_TICKS)
     duration_s = seconds(periods * CONTROL_PERIOD_TICKS)
-    return replace(base, name="stream", duration_s=duration_s, networks=tuple(networks))
+    return replace(base, name="stream", title=OF_STREAM, duration_s=duration_s, networks=tuple(networks))
 
 
 def image_of(recording: Recording, path: str | Path) -> Image:
@@ -268,11 +273,15 @@ class Job(msgspec.Struct, frozen=True, kw_only=True):
         until_tick: int | None = None,
         progress: Callable[[int], object] = lambda tick: None,
         cut: bool = False,
+        watch: Callable[[World], object] = lambda world: None,
     ) -> Run:
-        """Sends it again to `until_tick` (None: to its end). `cut`: as of RunSpec. Raises BadInput."""
+        """Sends it again to `until_tick` (None: to its end). `cut`: as of RunSpec. `watch` gets the world before it
+        moves. Raises BadInput.
+        """
         spec = replace(self.spec, until_tick=until_tick, cut=cut)
         with plain_parameters(spec.origin, "replayed"):
             run = Run.traced(spec)
+        watch(run.world)
         with replaying(spec.origin, run.world):
             return run.play(progress)
 
@@ -453,6 +462,8 @@ def _job_of_stream(
     script = script_of_stream(sent)
     with BadInput.at(path):
         written = scenario_of_stream(sent, header)
+        if header.scenario is None:
+            written = replace(written, name=name_of(path))
         text = changed(written, "", [*keys, *settings])
         scenario, expected = text.scenario, expectations_in(text)
         check_script(script, scenario)
@@ -462,6 +473,11 @@ def _job_of_stream(
             expectations_in(as_written)
     spec = RunSpec(scenario=scenario, image=image, script=script, expected=expected, origin=path)
     return _job_of_spec(spec, header, seed, as_written)
+
+
+def name_of(path: str) -> str:
+    """The name of a scenario that is made for this file."""
+    return re.sub(r"[^a-z0-9_-]+", "-", Path(path).stem.lower()).strip("_-")[:64] or "stream"
 
 
 def _job_of_spec(spec: RunSpec, header: Header, seed: int | None, as_written: AnyText) -> Job:

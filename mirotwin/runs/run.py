@@ -13,6 +13,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any, BinaryIO
 
 import msgspec
+import tomli_w
 
 from miro_exact.bad_input import BadInput
 from miro_exact.clock import CHARACTER_BITS, CONTROL_PERIOD_TICKS, CYCLE_TICKS, NEVER_TICK, TICKS_PER_SECOND
@@ -21,13 +22,14 @@ from miro_robot.image import Image
 from miro_sim.periods import Period
 from miro_sim.radio.downlink import TransmissionError
 from miro_sim.scenario.board import BoardScenario
+from miro_sim.scenario.board_scenario import any_of_text
 from mirotwin.runs import runner
 from mirotwin.runs.result import Result, expectation_lines, fault_lines
 from mirotwin.runs.spec import RunSpec, silent_scenario
 from mirotwin.shell.options import plain_parameters
-from mirotwin.shell.outputs import whole_file
+from mirotwin.shell.outputs import RECORDING, OutputFolder, whole_file
 from mirotwin.shell.verdicts import Verdict, judge
-from mirotwin.verify.cases.case import Trace, case_of_checks, case_text
+from mirotwin.verify.cases.case import Trace, case_of_checks, case_text, tables_of
 from mirotwin.verify.checks.happens import expect_of
 from mirotwin.verify.checks.interface import Failure
 from mirotwin.verify.checks.monitors import Checks
@@ -199,6 +201,17 @@ class Run:
         )
 
     # As files
+
+    def write(self, folder: OutputFolder) -> None:
+        """Records the periods that `play` came past, as run.mcap in the folder. Raises OutputError."""
+        from mirotwin.recording.recorder import Recorder, source_of  # loads the library of the format
+
+        text = any_of_text(tomli_w.dumps(tables_of(self.spec.robot_scenario)), self.spec.origin)
+        source = source_of(text, self.world, resumed=self.spec.resumed)
+        with folder, folder.part(RECORDING).open("wb") as stream, Recorder(stream, source) as recorder:
+            for period in self.periods:
+                recorder.write(period)
+            recorder.write_faults(self.world.devices, alone=not self.world.robots)
 
     def keep_saved(self, folder: Path) -> None:
         """Writes the states of the `save` steps. Raises OutputError."""

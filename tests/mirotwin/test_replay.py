@@ -13,6 +13,7 @@ from miro_host.posture import Posture
 from miro_protocol.frames import TeamFrame, TelemetryFrame, encode
 from miro_protocol.transmission import Transmission
 from miro_sim.periods import Axis
+from miro_sim.radio.params import Radio
 from miro_sim.scenario.build import check_robots
 from mirotwin.recording.capture.rows import rows
 from mirotwin.recording.compare import differences
@@ -171,9 +172,9 @@ def test_a_list_of_frames_says_who_sent_each_as_far_as_that_can_be_known(network
         Transmission(2_000_000, "<", answer, bad_stop=(5,)),
     )
     recorded = [msgspec.structs.replace(PERIOD, wire=sent)]
-    scenario = SimpleNamespace(networks=[SimpleNamespace(robots=3)] * networks)
+    scenario = SimpleNamespace(networks=[SimpleNamespace(robots=3, radio=Radio())] * networks)
     (table,) = frame_tables(
-        SimpleNamespace(spec=SimpleNamespace(robot_scenario=scenario), recorded=recorded), [], True, None
+        SimpleNamespace(spec=SimpleNamespace(robot_scenario=scenario), recorded=recorded), [], True, None, []
     )
     network = "net0 " if networks > 1 else ""
     assert list(table.columns[3].cells) == [f"{network}host", f"{network}robot 1", f"{network}robot ?"]

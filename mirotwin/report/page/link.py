@@ -3,6 +3,8 @@
 A host's transmission that holds a frame has a fate at each robot of its network: `fresh` (a valid frame with a new
 number arrived), `repeated` (a valid frame that is not), `damaged` (characters that are no frame), `lost` (nothing),
 `open` where the run ended before it could have arrived.
+Where a robot hears nothing fresh for so long that its failsafe orders the wheels to stop (`stopped`) or the motors off
+(`off`), that has a lane of its own.
 What arrives belongs to the last transmission before it, shifted by the radio's latency. Characters that come at other
 times are `noise` on an idle carrier.
 """
@@ -20,13 +22,15 @@ from miro_exact.clock import CHARACTER_BITS, HOST_CHARACTER_TICKS, ROBOT_BIT_TIC
 from miro_protocol.decoder import Decoder, Received
 from miro_protocol.frames import ContentError, describe
 from miro_protocol.robot_receiver import Reception, RobotReceiver
-from miro_protocol.robot_rules import TO_RI_TICKS
-from miro_protocol.table import TELEMETRY
+from miro_protocol.robot_rules import ACTING_TICKS, TO_RI_TICKS
+from miro_protocol.table import TELEMETRY, TICKS_PER_MS
 from miro_protocol.transmission import DOWN, Transmission
-from miro_sim.periods import Period
+from miro_sim.periods import Period, RobotId
 from miro_sim.world.events import BoardLog, Cursor, Event
 from miro_sim.world.world import World
+from mirotwin.verify.checks.orders import Orders
 
+STOPS = {"stopped": "wheels told to stop", "off": "motors off"}
 OF_PC = ("answer", "reset", "power", "radio")
 RESTARTS = ("reset", "power")
 ROBOT_CHARACTER_TICKS = CHARACTER_BITS * ROBOT_BIT_TICKS
@@ -37,13 +41,14 @@ SLACK_TICKS = 24_000
 
 
 class LinkMark(msgspec.Struct, frozen=True):
-    """Something on a lane from `start_tick` to `end_tick`."""
+    """Something on a lane from `start_tick` to `end_tick`. `robot`: at which it happened, if at one."""
 
     lane: str
     kind: str
     start_tick: int
     end_tick: int
     text: str
+    robot: RobotId | None = None
 
 
 class Arrival(NamedTuple):
@@ -53,11 +58,25 @@ class Arrival(NamedTuple):
     fresh: bool | None
 
 
+class Stop(NamedTuple):
+    """An order of the failsafe, `stopped` or `off`, so long after the last fresh frame."""
+
+    tick: int
+    kind: str
+    after_ticks: int
+
+
 class Arrivals:
-    """Characters that the serial port of one of `robots` delivers, and when each came."""
+    """Characters that the serial port of one of `robots` delivers, and when each came.
+
+    `stops`: of each silence, the first order to stop and the first to switch off that no frame can have caused.
+    """
 
     def __init__(self, log: BoardLog, robots: int) -> None:
         self.all: list[Arrival] = []
+        self.stops: list[Stop] = []
+        self._orders = Orders()
+        self._fresh_tick = -1
         self._log = Cursor(log)
         self._robots = robots
         self._ticks: list[int] = []
@@ -65,14 +84,29 @@ class Arrivals:
 
     def look(self, restarts: Sequence[Event]) -> None:
         """Takes over what is new; a robot that begins again knows nothing of before."""
-        received = [event for _, event in self._log.read() if event.what == "received"]
-        for event in sorted([*received, *restarts], key=lambda event: event.tick):
+        own = [event for _, event in self._log.read() if event.what in ("received", "command")]
+        for event in sorted([*own, *restarts], key=lambda event: event.tick):
             if event.what == "received":
                 self._ticks.append(event.tick - TO_RI_TICKS)
-                self._note(self._receiver.character(event.value, event.good_stop, event.tick))
+                receptions = self._receiver.character(event.value, event.good_stop, event.tick)
+                self._note(receptions)
+                if any(fresh for _, fresh in receptions):
+                    self._fresh_tick = event.tick
+            elif event.what == "command":
+                self._take_order(event)
             else:
                 self.flush()
                 self._receiver = RobotReceiver(self._robots)
+                self._orders, self._fresh_tick = Orders(), -1
+
+    def _take_order(self, event: Event) -> None:
+        order = self._orders.take(event)
+        after = event.tick - self._fresh_tick
+        if order is None or order.what == "drive" or self._fresh_tick < 0 or after <= ACTING_TICKS:
+            return
+        kind = "off" if order.what == "off" else "stopped"
+        if not any(stop.kind == kind and stop.tick > self._fresh_tick for stop in self.stops[-2:]):
+            self.stops.append(Stop(event.tick, kind, after))
 
     def flush(self) -> None:
         """Nothing more comes."""
@@ -124,8 +158,9 @@ class LinkLog:
             for robot in network.robots:
                 arrivals = self._arrivals[index, robot.slot]
                 arrivals.flush()
-                lane = f"net{index}/robot{robot.slot} hears"
-                marks += _fates(lane, sent, named, arrivals.all, delay, self.world.tick)
+                place = (index, robot.slot)
+                marks += _fates(place, sent, named, arrivals.all, delay, self.world.tick)
+                marks += _stops(place, arrivals, self.world.tick)
             marks += _answers(received, self._at_pc[index], index)
             marks += [_action(event) for event in self._at_pc[index] if event.what != "answer"]
         return marks
@@ -157,7 +192,7 @@ def _sent(sent: Transmission, named: str) -> LinkMark:
 
 
 def _fates(
-    lane: str,
+    robot: RobotId,
     sent: Sequence[Transmission],
     named: Sequence[str],
     arrivals: Sequence[Arrival],
@@ -165,6 +200,7 @@ def _fates(
     over_tick: int,
 ) -> list[LinkMark]:
     """The result of each transmission; characters that belong to none are noise."""
+    lane = f"net{robot[0]}/robot{robot[1]} hears"
     begins = [arrival.tick + delay - SLACK_TICKS for arrival in sent]
     ends = [arrival.tick + delay + len(arrival.data) * HOST_CHARACTER_TICKS + SLACK_TICKS for arrival in sent]
     damaged: dict[int, int] = {}  # transmission -> characters of it in no frame
@@ -188,8 +224,21 @@ def _fates(
         kind = _fate(frames.get(number), damaged.get(number, 0), end + SLACK_TICKS > over_tick)
         if name or kind not in ("lost", "open"):
             shown = min(end, over_tick) if kind == "open" else end
-            marks.append(LinkMark(lane, kind, start, shown, f"{name or 'no frame'}: {kind}"))
+            marks.append(LinkMark(lane, kind, start, shown, f"{name or 'no frame'}: {kind}", robot))
     return sorted(marks, key=lambda mark: mark.start_tick)
+
+
+def _stops(robot: RobotId, arrivals: Arrivals, over_tick: int) -> list[LinkMark]:
+    """From each order of the failsafe to its next one, or to the next fresh frame."""
+    lane = f"net{robot[0]}/robot{robot[1]} failsafe"
+    begins = [stop.tick for stop in arrivals.stops]
+    begins += [arrival.ticks[-1] for arrival in arrivals.all if arrival.fresh]
+    marks = []
+    for tick, kind, after_ticks in arrivals.stops:
+        end = min((begin for begin in begins if begin > tick), default=over_tick)
+        text = f"{STOPS[kind]}, {after_ticks / TICKS_PER_MS:.1f} ms after the last fresh frame"
+        marks.append(LinkMark(lane, kind, tick, end, text, robot))
+    return marks
 
 
 def _together(ticks_of: Sequence[int]) -> list[tuple[int, int, int]]:

@@ -30,6 +30,8 @@ KIND_COLOURS = {
     "repeated": "repeated",
     "answer": "truth",
     "action": "measured",
+    "stopped": "warn",
+    "off": "bad",
     "damaged": "bad",
     "lost": "lost",
 }

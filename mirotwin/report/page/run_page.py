@@ -74,13 +74,15 @@ def run_page(material: Material) -> bytes:
     ticks = [*(one.tick for one in again.result.failures), *(fault.tick for _, _, fault in again.faults)]
     figures = figures_of(tracks, marks, list(filter(tracks.shows, ticks)))
     kinds = {mark.kind for mark in marks}
+    seen = any(steered) or bool(material.extras.frames)  # else nobody looks at what the camera measured
     values = {
         **shared(material, TICKS_PER_SECOND),
         "scenario_text": tomli_w.dumps(tables_of(scenario)),
         "told": any(value == value for robot in tracks.robots for value in robot.told_v_m_s),
         "facts": _facts(material, tracks),
         "tracks": tracks,
-        "pitch": pitch_of(tracks),
+        "pitch": pitch_of(tracks, seen=seen),
+        "seen": seen,
         "pitch_shows": "where each robot is, should be and was seen",
         "kinds": [(kind, colour) for kind, colour in KIND_COLOURS.items() if kind in kinds],
         "lanes": [(lane, Counter(one.kind for one in marks if one.lane == lane)) for lane in lanes_of(marks)],
@@ -133,8 +135,8 @@ class Pitch(msgspec.Struct, frozen=True):
     half: float = 100.0 * ground.ROBOT_HALF_M
 
 
-def pitch_of(tracks: PageTracks, bodies: Sequence[tuple[int, str]] = ()) -> Pitch:
-    """`bodies`: colour and label of each; default: those of one run, with what the camera measured."""
+def pitch_of(tracks: PageTracks, bodies: Sequence[tuple[int, str]] = (), seen: bool = True) -> Pitch:
+    """`bodies`: colour and label of each; default: those of one run, with what the camera measured if it is `seen`."""
     paths, drawn = [], []
     corners = [
         (100.0 * ground.LEFT_M, 100.0 * ground.BOTTOM_M),
@@ -149,10 +151,10 @@ def pitch_of(tracks: PageTracks, bodies: Sequence[tuple[int, str]] = ()) -> Pitc
         if bodies:
             drawn.append(Body(*bodies[number], robot.steered))
             continue
-        measured = [place for place in _places(robot.measured) if not math.isnan(place[0])]
+        measured = [place for place in _places(robot.measured) if seen and not math.isnan(place[0])]
         dots = "".join(f"M{x:.2f} {y:.2f}h0" for x, y in measured)
         label = f"{robot.id[1]}" if len(tracks.robots) > 1 else ""
-        drawn.append(Body(number % 5, label, robot.steered, dots, True))
+        drawn.append(Body(number % 5, label, robot.steered, dots, seen))
     left, right = min(x for x, _ in corners) - MARGIN_CM, max(x for x, _ in corners) + MARGIN_CM
     bottom, top = min(y for _, y in corners) - MARGIN_CM, max(y for _, y in corners) + MARGIN_CM
     return Pitch(f"{left:.2f} {-top:.2f} {right - left:.2f} {top - bottom:.2f}", paths, drawn)

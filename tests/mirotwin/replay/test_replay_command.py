@@ -349,8 +349,7 @@ def test_a_recording_of_another_format_is_refused_with_the_reason(
         (("--seed", "-1"), "-1 is not in the range"),
         (("--set", "nonsense=1"), "--set nonsense=1: unknown key"),
         (("--sources", "nowhere"), "there is no such folder"),
-        (("--out", "elsewhere"), "--out needs --port."),
-        (("--force",), "--force needs --port."),
+        (("--force",), "--force needs --out or --port."),
         (("--lines-from", "nowhere.ihx"), "nowhere.ihx: there is no such file"),
     ],
 )  # fmt: skip

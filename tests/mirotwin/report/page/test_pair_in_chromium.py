@@ -1,11 +1,12 @@
 """The page of two runs in a browser: the slider moves both robots and every figure; it fits, and nothing complains."""
 
 import pytest
+from PIL import Image
 
 from miro_exact.clock import TICKS_PER_SECOND
 from mirotwin.recording.reader import read
 from tests.mirotwin.report.page import browser
-from tests.mirotwin.report.page.browser import chromium, open_page, rings
+from tests.mirotwin.report.page.browser import apart, chromium, open_page, rings, small
 
 pytest.importorskip("selenium", reason=browser.MISSING)
 from selenium.webdriver.common.by import By
@@ -54,6 +55,15 @@ def test_a_robot_whose_run_is_over_is_not_drawn(driver, runs):
     assert shown == [True, False]
     cells = [one.text for one in driver.find_elements(By.CSS_SELECTOR, "#now-other td")]
     assert cells == ["\u2013"] * 3
+
+
+def test_the_pictures_in_the_documents_are_those_of_the_present_pages(tmp_path):
+    from docs.film.pages import DOCS, draw
+
+    draw(tmp_path)
+    for name in ("two-runs.png", "capture.png"):
+        now, then = (small(Image.open(folder / name).convert("RGB")) for folder in (tmp_path, DOCS))
+        assert apart(now, then) < 1.5, "python -m docs.film.pages makes them again"
 
 
 @pytest.mark.parametrize("theme", ["light", "dark"])
