@@ -49,7 +49,7 @@ def replayed_capture(folder: Path) -> Path:
     )
     stream.write(folder / "capture.stream", sent)
     mirotwin("export", folder / "capture.stream", "--out", folder / "capture.pcapng", "-q")
-    mirotwin("replay", folder / "capture.stream", "--out", folder / "replayed", "-q")
+    mirotwin("replay", folder / "capture.pcapng", "--out", folder / "replayed", "-q")
     mirotwin("report", folder / "replayed", "-o", folder / "capture.html", "-q")
     return folder / "capture.html"
 

@@ -130,7 +130,7 @@ def page_of(wanted: ReportOptions, name: str = "") -> bytes:
 
 def _side(wanted: ReportOptions, subject: str) -> Side:
     """One of two runs: as it was recorded, or what a case or a stream file does. Raises BadInput."""
-    job = load_job(_file_of(subject))
+    job = load_job(_file_of(subject), capture=wanted.capture)
     file = Path(job.spec.origin)
     if job.alone or job.origin:
         what = "a board" if job.alone else "what was recorded at a port"
@@ -221,7 +221,7 @@ def _of_case(wanted: ReportOptions, job: Job, name: str) -> Material:
     report = Path(job.spec.origin).with_name(REPORT)
     text = read_input(report).decode("utf-8", "replace") if report.is_file() else ""
     return Material(
-        kind="failed test" if text else "case" if job.case.verdict else "stream file",
+        kind="failed test" if text else "case" if job.case.verdict else job.captured_as or "stream file",
         job=job,
         again=again,
         periods=[period for period in again.periods if period.index in shown],

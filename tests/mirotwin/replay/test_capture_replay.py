@@ -107,9 +107,14 @@ def test_out_makes_a_recording_that_replays_bit_for_bit(mirotwin, recorded, capt
     assert source.scenario_name == "my-capture"
 
 
-@pytest.mark.parametrize("of", ["recording", "stream"])
+@pytest.mark.parametrize("of", ["run", "stream file", "pcapng capture"])
 def test_its_page_has_its_name_and_no_errors_against_a_line(mirotwin, recorded, capture, tmp_path, of):
-    mirotwin.succeeds("report", recorded if of == "recording" else capture, "-o", tmp_path / "x.html", "-q")
+    file = recorded if of == "run" else capture
+    if of == "pcapng capture":
+        file = tmp_path / "My capture.pcapng"
+        mirotwin.succeeds("export", capture, "--out", file, "-q")
+    assert mirotwin("report", file, "-o", tmp_path / "x.html", "-q")[0] == 0
+    assert f'<p class="kind">{of}</p>' in (tmp_path / "x.html").read_text()
     page = Markup(tmp_path / "x.html")
     assert "my-capture" in page.text
     assert "What was sent, over an ideal link to robots that stand" in page.text
