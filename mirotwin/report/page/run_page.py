@@ -34,6 +34,8 @@ from mirotwin.verify.cases.case import tables_of
 
 SILENT = "silent"
 MARGIN_CM = 3.0
+ROOM_CM = 142.0 * ground.ROBOT_HALF_M - MARGIN_CM
+"""Beyond the margin, what a robot at the end of its path needs: half its diagonal."""
 MOST_POINTS = 4000
 """Largest number of points of a path; a longer one is drawn with every second point, or every third, and so on."""
 
@@ -146,7 +148,9 @@ def pitch_of(tracks: PageTracks, bodies: Sequence[tuple[int, str]] = (), seen: b
         kinds = [("truth", robot.truth), *([("reference", robot.reference)] if robot.steered else [])]
         for kind, postures in kinds:
             places = _places(postures)
-            corners += [(x, y) for x, y in places if math.isfinite(x + y)]
+            corners += [
+                (x + way, y + way) for x, y in places if math.isfinite(x + y) for way in (-ROOM_CM, ROOM_CM)
+            ]
             paths.append((number, kind, " ".join(f"{x:.2f},{y:.2f}" for x, y in places)))
         if bodies:
             drawn.append(Body(*bodies[number], robot.steered))

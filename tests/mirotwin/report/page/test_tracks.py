@@ -8,6 +8,7 @@ from msgspec.structs import replace
 
 from miro_exact.clock import CONTROL_PERIOD_TICKS, TICKS_PER_SECOND
 from miro_protocol.frames import TeamFrame
+from miro_sim.pitch import ground
 from mirotwin import ms
 from mirotwin.recording.channels import SampleMessage
 from mirotwin.recording.reader import read
@@ -110,7 +111,8 @@ def test_a_path_that_leaves_the_pitch_is_in_the_picture():
     tracks = tracks_of(list(synthetic.periods(400)), [True], 0)  # 0.2 m/s for 13 s
     left, top, width, height = map(float, pitch_of(tracks).view_box.split())
     assert left <= -13.0
-    assert left + width >= 100.0 * max(tracks.robots[0].truth.x_m) > 120.0
+    corner_cm = 100.0 * math.sqrt(2.0) * ground.ROBOT_HALF_M
+    assert left + width >= 100.0 * max(tracks.robots[0].truth.x_m) + corner_cm > 120.0
     assert -top >= 83.0
     assert height >= 96.0
 
