@@ -11,6 +11,7 @@ import base64
 import bisect
 import re
 import secrets
+import time
 from collections.abc import Callable, Iterable, Iterator
 from contextlib import suppress
 from functools import partial
@@ -22,6 +23,7 @@ import msgspec
 
 from miro_exact.bad_input import BadInput, one_line
 from miro_exact.clock import CYCLE_TICKS
+from miro_robot.faults import DESCRIPTIONS, FaultKind
 from miro_robot.image.c_types import CType
 from miro_robot.inspect.writes import Bytes
 from miro_robot.mcs51.opcodes import SFRS
@@ -40,6 +42,7 @@ CAPABILITIES = (
     "ConfigurationDoneRequest", "FunctionBreakpoints", "ConditionalBreakpoints", "HitConditionalBreakpoints",
     "LogPoints", "StepBack", "SteppingGranularity", "InstructionBreakpoints", "DataBreakpoints", "DisassembleRequest",
     "ReadMemoryRequest", "EvaluateForHovers", "TerminateRequest", "CompletionsRequest", "SetVariable",
+    "ExceptionInfoRequest", "GotoTargetsRequest", "RestartRequest", "BreakpointLocationsRequest",
 )  # fmt: skip
 _WITHOUT_A_RUN = ("initialize", "launch", "disconnect", "terminate")
 _WHILE_IT_RUNS = (
@@ -65,6 +68,9 @@ _REASONS = {
     "step": "step",
 }  # fmt: skip
 """By the first word of why it stopped; "pause" for any other."""
+_PATIENCE_S, _PROGRESS_S = 1.0, 0.5  # before something is said to be under way, and between two updates
+_FIXED = "cannot be set: a run is bits, and with another value it would be another run"
+_INSTEAD = "values of a board's parts can be put; change the program, or its input, and restart"
 _UNUSABLE = (AttributeError, LookupError, TypeError, ValueError)  # what comes of arguments of another form
 Shown = Callable[[], Value]
 
@@ -82,6 +88,11 @@ class Adapter:
         self.paused = self.ended = False
         self.run_after: Callable[[], object] | None = None
         self.begin: Callable[[], object] = lambda: None
+        self.launched: Message = {}
+        self.asked: dict[str, tuple[Message, Callable[[Message], str], list[int | None]]] = {}
+        self.why, self.notes = "", list[str]()
+        self.shows_progress = False
+        self.progress_at_s, self.progress = 0.0, 0
 
     def serve(self) -> None:
         """Until the client leaves. Raises BadInput for what is no message, OSError where it has gone."""
@@ -130,7 +141,17 @@ class Adapter:
     def on_initialize(self, given: Message) -> Message:
         if given.get("linesStartAt1") is False:
             raise BadInput("", "initialize", "lines begin with 1 here")
-        return {f"supports{one}": True for one in CAPABILITIES}
+        self.shows_progress = bool(given.get("supportsProgressReporting"))
+        filters = [
+            {
+                "filter": kind.name,
+                "label": DESCRIPTIONS[kind],
+                "default": True,
+                "description": "a firmware fault",
+            }
+            for kind in FaultKind
+        ]
+        return {f"supports{one}": True for one in CAPABILITIES} | {"exceptionBreakpointFilters": filters}
 
     def on_launch(self, given: Message) -> None:
         if (
@@ -140,8 +161,14 @@ class Adapter:
             raise BadInput(
                 "", "launch", "the token is not the one that was printed", 'add "token" to launch.json'
             )
-        debugger, notes, why = open_subject(launched(given), everyone=True)
+        self._open(given)
+
+    def _open(self, given: Message) -> None:
+        debugger, notes, why = open_subject(launched(given), everyone=True, interrupted=self._interrupted)
+        self.launched = given
         self.use(debugger)
+
+        self.notes = notes
 
         def begin() -> None:
             for line in notes:
@@ -175,6 +202,25 @@ class Adapter:
     def on_disconnect(self, given: Message) -> None:
         self.paused = self.ended = True
 
+    def on_restart(self, given: Message) -> None:
+        """The same from its start, with the image as it is now; breakpoints are found again by their names."""
+        asked, kinds = self.asked, self.its.fault_kinds
+        self._open(given.get("arguments") or self.launched)
+        self.its.fault_kinds = kinds
+        for kind, (items, place, numbers) in asked.items():
+            replies = self._set(kind, items, place)["breakpoints"]
+            made = {point.number: point for point in self.its.breakpoints}
+            for reply, number in zip(replies, numbers, strict=True):
+                if number is not None and reply["verified"]:
+                    made[reply["id"]].number = number  # as the client knows it
+                if number is not None:
+                    self._event("breakpoint", reason="changed", breakpoint={**reply, "id": number})
+            self.asked[kind] = items, place, numbers
+        self.its.number_from(
+            max((number or 0 for _, _, all_of in asked.values() for number in all_of), default=0)
+        )
+        self.run_after = self.begin
+
     def on_terminate(self, given: Message) -> None:
         self.paused = True
         self.run_after = partial(self._event, "terminated")
@@ -198,14 +244,60 @@ class Adapter:
         return self._set("data breakpoint", given, lambda item: item["dataId"])
 
     def on_setExceptionBreakpoints(self, given: Message) -> Message:
-        return {"breakpoints": []}  # some clients send it, though there is none to choose
+        names = [
+            *(given.get("filters") or ()),
+            *(one["filterId"] for one in given.get("filterOptions") or ()),
+        ]
+        known = [name in FaultKind.__members__ for name in names]
+        self.its.fault_kinds = {FaultKind[name] for name in names if name in FaultKind.__members__}
+        return {"breakpoints": [{"verified": one} for one in known]}
+
+    def on_exceptionInfo(self, given: Message) -> Message:
+        """The fault, or the failed check of a case, at which it stands."""
+        if _REASONS.get(self.why.partition(" ")[0]) != "exception":
+            raise BadInput("", "exceptionInfo", "it does not stand at a fault or a failed check")
+        kind = next((kind.name for kind, words in DESCRIPTIONS.items() if words in self.why), "failed check")
+        text = "\n".join(self.notes) if self.why == "case" else self.why
+        return {"exceptionId": kind, "description": text, "breakMode": "always"}
+
+    def on_breakpointLocations(self, given: Message) -> Message:
+        """The lines with code from `line` to `endLine`."""
+        name = AnyPath(given["source"].get("path") or given["source"].get("name") or "").name
+        wanted = range(given["line"], (given.get("endLine") or given["line"]) + 1)
+        there = {one.line for one in self.symbols.line_begins.values() if AnyPath(one.file).name == name}
+        return {"breakpoints": [{"line": line} for line in sorted(there.intersection(wanted))]}
+
+    def on_gotoTargets(self, given: Message) -> Message:
+        """Where a line is executed next: the run goes on to it, as nothing can be jumped over."""
+        path = given["source"].get("path") or given["source"].get("name") or ""
+        addresses, line = self.symbols.at_line(path, given["line"])
+        return {
+            "targets": [
+                {"id": address, "label": f"on to {self.symbols.place(address)}", "line": line.line,
+                 "instructionPointerReference": f"{address:#06x}"}
+                for address in addresses
+            ]
+        }  # fmt: skip
+
+    def on_goto(self, given: Message) -> None:
+        address = int(given["targetId"])
+        self.timeline.focus = self._thread(given)
+
+        def run() -> None:
+            why = self.its.run_to([address])
+            self._stopped("goto" if why == STEPPED else why)
+
+        self.run_after = partial(self._watched_run, run)
 
     def _set(self, kind: str, given: Message, place: Callable[[Message], str]) -> Message:
         """All breakpoints of a kind, which replace those before."""
         self.its.breakpoints[:] = [item for item in self.its.breakpoints if item.kind != kind]
+        self.asked[kind] = given, place, []
         self.its.changed = True
-        replies = []
+        replies: list[Message] = []
+        numbers: list[int | None] = []
         for item in given.get("breakpoints") or ():
+            numbers.append(None)
             conditions = item.get("condition") or "", item.get("hitCondition") or ""
             try:
                 where = place(item)
@@ -218,6 +310,7 @@ class Adapter:
                 replies.append({"verified": False, "message": str(error)})
                 continue
             made.kind, made.log = kind, log
+            numbers[-1] = made.number
             reply: Message = {"verified": True, "id": made.number, "message": made.note or None}
             if made.watched is None:
                 first = min(made.addresses)
@@ -227,6 +320,7 @@ class Adapter:
                     "line": None if line is None else line.line,
                 }
             replies.append(reply)
+        self.asked[kind] = given, place, numbers
         return {"breakpoints": replies}
 
     def _watched(self, data: str, condition: str, count: str, access: str) -> Breakpoint:
@@ -298,8 +392,36 @@ class Adapter:
             raise BadInput("", f"thread {number}", "there is no such robot")
         return threads.index(number)
 
-    def _go(self, verb: str, by_instruction: bool) -> None:
+    def _watched_run(self, run: Callable[[], object]) -> None:
+        """Something that may take long: after a second it is said to be under way."""
         self.paused = False
+        self.progress_at_s = time.monotonic() + _PATIENCE_S
+        try:
+            run()
+        finally:
+            self.progress_at_s = 0.0
+            if self.progress > 0:
+                self._event("progressEnd", progressId=str(self.progress))
+            self.progress = -abs(self.progress)
+
+    def _tell_progress(self) -> None:
+        """Where the run is, of its whole length."""
+        now_s = time.monotonic()
+        if not self.shows_progress or not self.progress_at_s or now_s < self.progress_at_s:
+            return
+        end_tick = self.timeline.run.end_tick
+        share = min(100.0 * self.timeline.tick / end_tick, 100.0) if end_tick else None
+        event = "progressUpdate" if self.progress > 0 else "progressStart"
+        self.progress = self.progress if self.progress > 0 else 1 - self.progress
+        title = {"title": "running"} if event == "progressStart" else {}
+        text = self.session.time(self.timeline.tick, self.timeline.focus).strip()
+        self._event(event, progressId=str(self.progress), message=text, percentage=share, **title)
+        self.progress_at_s = now_s + _PROGRESS_S
+
+    def _go(self, verb: str, by_instruction: bool) -> None:
+        self._watched_run(partial(self._move_and_say, verb, by_instruction))
+
+    def _move_and_say(self, verb: str, by_instruction: bool) -> None:
         try:
             why = self.its.move(verb, by_instruction)
         except BadInput as error:
@@ -315,6 +437,8 @@ class Adapter:
 
     def _interrupted(self) -> bool:
         """Answers what comes during a run; true where that ends it."""
+        if self.began:
+            self._tell_progress()
         while not self.paused and (request := self.wire.next(wait=False)) != {}:
             if request is None:
                 self.paused = True
@@ -328,6 +452,7 @@ class Adapter:
         return self.paused
 
     def _stopped(self, why: str, text: str = "") -> None:
+        self.why = why
         word, _, digits = why.partition(" ")
         number = int(digits) if word == "breakpoint" else 0
         kind = next((one.kind for one in self.its.breakpoints if one.number == number), "")
@@ -431,9 +556,10 @@ class Adapter:
 
     def on_setVariable(self, given: Message) -> Message:
         """A value of a part is put; nothing else of a run can be set."""
-        path = _joined(self.children[given["variablesReference"] - 1][1], given["name"]).removeprefix(
-            "parts."
-        )
+        whole = _joined(self.children[given["variablesReference"] - 1][1], given["name"])
+        path = whole.removeprefix("parts.")
+        if path == whole:
+            raise BadInput("", given["name"], _FIXED, _INSTEAD)
         value = given["value"]
         with suppress(msgspec.DecodeError):
             value = msgspec.json.decode(value)
@@ -443,6 +569,12 @@ class Adapter:
             reason, _, remedy = f"{error}".partition("; ")
             raise BadInput("", "", reason, remedy) from None
         return {"value": f"{given['value']}   (from tick {tick} on)"}
+
+    def on_setExpression(self, given: Message) -> None:
+        raise BadInput("", given["expression"], _FIXED, _INSTEAD)
+
+    def on_writeMemory(self, given: Message) -> None:
+        raise BadInput("", given["memoryReference"], _FIXED, _INSTEAD)
 
     def _shown(self, get: Shown, path: str, key: str = "value") -> Message:
         """A value; one that is not live says so in its place."""
@@ -471,8 +603,8 @@ class Adapter:
         if given.get("context") != "repl" or not is_command(text, self.symbols.known):
             value = expression(text)(self._moment(given.get("frameId")))
             return self._shown(lambda: value, text, "result")
-        there, self.paused = self.its.breakpoints[:], False
-        do(self.session, text)
+        there = self.its.breakpoints[:]
+        self._watched_run(partial(do, self.session, text))
         for breakpoint in there:
             if breakpoint.kind and breakpoint not in self.its.breakpoints:
                 self._event(

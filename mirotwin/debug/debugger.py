@@ -15,6 +15,8 @@ from typing import Any, NamedTuple
 import msgspec
 
 from miro_exact.bad_input import BadInput
+from miro_exact.clock import CYCLE_TICKS
+from miro_robot.faults import FaultKind, FirmwareFault
 from miro_robot.image.symbol_files import SourceLine
 from miro_robot.inspect.frames import StackFrame
 from miro_robot.inspect.writes import Bytes
@@ -80,6 +82,7 @@ class _Line(NamedTuple):
 class Debugger:
     """Of one run. `everyone`: breakpoints are for all processors, else for the one in focus.
 
+    `fault_kinds`: firmware faults at which it stops also where the run goes on past them.
     `changed`: set by who changes breakpoints while it searches, which then goes on with them.
     What stopped it is returned as a text: "breakpoint 1", "step", "the run ends here".
     """
@@ -91,9 +94,14 @@ class Debugger:
         self.breakpoints: list[Breakpoint] = []
         self.told: list[LogOutput] = []
         self.changed = False
+        self.fault_kinds: set[FaultKind] = set()
         self._numbers = 0
         self._reported_there: list[LogOutput] = []
         self._stopped_at: Position = (-1, 0)
+
+    def number_from(self, number: int) -> None:
+        """Later breakpoints have higher numbers than this."""
+        self._numbers = max(self._numbers, number)
 
     # Where it stands
 
@@ -350,7 +358,9 @@ class Debugger:
         if step is not None and here[0] == self._stopped_at[0]:
             here = max(here, self._stopped_at)  # of another processor, in the same cycle
         hit, self.changed = None, True
-        with self.timeline.interrupted_by(lambda: interrupted() or self.changed):
+        with self.timeline.interrupted_by(
+            lambda: interrupted() or self.changed or bool(self._fault_since(here))
+        ):
             while hit is None and self.changed:
                 self.changed = False
                 if self._count_hits():
@@ -361,12 +371,26 @@ class Debugger:
             self.breakpoints.remove(hit.found)
         return hit
 
+    def _fault_since(self, here: Position) -> tuple[Position, FirmwareFault] | None:
+        """The first of the faults that are stopped at, after this moment."""
+        since = [
+            ((-(-fault.tick // CYCLE_TICKS), index), fault)
+            for index, core in enumerate(self.timeline.cores)
+            for fault in (core.device.board.faults if self.fault_kinds else ())
+            if fault.kind in self.fault_kinds
+        ]
+        return min((one for one in since if one[0][0] > here[0]), default=None, key=lambda one: one[0])
+
     def _forward(self, step: Trap | None = None) -> str:
         self.told.clear()
         here, known = self.timeline.here, self._reported_there
         hit = self._search(self.timeline.find, step)
         outputs = sorted(output for output in self.told if output[:2] != here or output not in known)
         self.told = [output for output in outputs if hit is None or output[:2] <= hit[:2]]
+        fault = self._fault_since(here)
+        if fault is not None and (hit is None or fault[0] < hit[:2]):
+            self.timeline.land(Hit(*fault[0], fault[1]))
+            return f"firmware fault: {fault[1]}"
         if hit is None:
             return self._at_end() or INTERRUPTED
         self._reported_there = [output for output in self.told if output[:2] == hit[:2]]

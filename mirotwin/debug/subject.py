@@ -4,7 +4,9 @@ from __future__ import annotations
 
 import os
 import re
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
+from pathlib import Path
+from tempfile import TemporaryDirectory
 from typing import Annotated, Any
 
 import click
@@ -12,6 +14,8 @@ import msgspec
 
 from miro_exact.bad_input import BadInput
 from miro_exact.inputs import WORLD_BYTES, read_input
+from miro_robot.firmware import image_path
+from miro_sim.scenario.board_scenario import BoardText, is_board, load_any
 from mirotwin.debug.board_values import names_on
 from mirotwin.debug.debugger import Debugger
 from mirotwin.debug.symbols import Symbols
@@ -21,13 +25,18 @@ from mirotwin.runs.inspected_run import InspectedRun
 from mirotwin.runs.job import Job
 from mirotwin.runs.result import Result
 from mirotwin.runs.run import Run
+from mirotwin.runs.spec import RunSpec
 from mirotwin.shell.command import Argument, command_of
 from mirotwin.shell.debug_files import LinesFrom, SourceFolders, debugged_image, load_images
-from mirotwin.shell.options import AT, RESUME
+from mirotwin.shell.firmware_image import image_for
+from mirotwin.shell.options import AT, RESUME, plain_parameters
 from mirotwin.shell.outputs import RECORDINGS, file_in
+from mirotwin.shell.progress import ProgressBar
 from mirotwin.shell.times import Time
 from mirotwin.verify.cases.artifacts import CASES
+from mirotwin.verify.checks.expect import expectations_in
 from mirotwin.verify.checks.interface import Failure
+from mirotwin.verify.steps.reading import steps_in
 
 
 class DebugSubject(SubjectOptions, frozen=True, kw_only=True):
@@ -40,6 +49,8 @@ class DebugSubject(SubjectOptions, frozen=True, kw_only=True):
     sources: SourceFolders = ()
 
 
+_SAME_TIME_S = 2.0
+"""Files of one checkout are written within it, in any order."""
 _NAMES = {"settings": "set"}
 """Options that are called otherwise than their fields."""
 
@@ -67,30 +78,36 @@ def launched(given: Mapping[str, Any]) -> DebugSubject:
     return subject
 
 
-def open_subject(options: DebugSubject, everyone: bool = False) -> tuple[Debugger, list[str], str]:
+def open_subject(
+    options: DebugSubject, everyone: bool = False, interrupted: Callable[[], bool] = lambda: False
+) -> tuple[Debugger, list[str], str]:
     """A debugger at the start, at `--at`, or at the failed check of a case. Raises BadInput.
 
+    `interrupted` is called between two pieces of a run; true ends it where it is.
     With it what there is to know before anything is asked, and why it stands where it does.
     """
     subject = options.subject
     if not subject:
         raise BadInput("", "subject", "is missing", "name a scenario, an image, a recording or a case")
     if os.path.isdir(subject):
-        subject = file_in(subject, (*RECORDINGS, *CASES))
+        subject = _file_below(subject)
         options = msgspec.structs.replace(options, subject=subject)
-    run, verdict = open_run(options), None
+    verdict = None
+    run, failed = _open_steps(options) or (open_run(options), [])
     if options.resume is not None:
         _resume(run, options.resume)
     images = load_images(options.lines_from, run.image)
     symbols = Symbols(*debugged_image(run.image, images, options.sources), names_on(run.device.board))
     image, files = symbols.image, {line.file for line in symbols.line_begins.values()}
     timeline = Timeline(run)
-    debugger, notes, why = Debugger(timeline, symbols, everyone), list[str](), "begin"
+    debugger, notes, why = Debugger(timeline, symbols, everyone), failed, "begin"
+    if newer := _newer_sources(symbols):
+        notes.append(f"newer than {image.path.name}: {', '.join(newer)}; lines may not fit, build it again")
     if not image.symbols.names:
         notes.append(f"no symbols: no .map, .cdb or .M51 beside {image.path.name}; places are addresses")
     elif files and not any(map(symbols.sources.path, files)):
         notes.append("no C files: --sources names their folder")
-    with timeline.shown(f"opening {subject}"):
+    with timeline.shown(f"opening {subject}", interrupted):
         if run.job is not None and not run.job.recorded and (run.job.case.verdict or run.job.alone):
             verdict = _judged(timeline, run, run.job)
         if verdict is not None:
@@ -101,6 +118,63 @@ def open_subject(options: DebugSubject, everyone: bool = False) -> tuple[Debugge
         if options.at is not None:
             why = debugger.go_to(options.at.ticks(run.tick_hz))
     return debugger, notes, why
+
+
+def _file_below(folder: str) -> str:
+    """What there is to debug in a folder: a recording, a case, or the only case in a folder below it."""
+    path = file_in(folder, (*RECORDINGS, *CASES))
+    if path != folder:
+        return path
+    streams = sorted(str(each) for each in Path(folder).glob("*.stream"))
+    streams += sorted(str(each) for name in CASES for each in Path(folder).glob(f"*/{name}"))
+    if len(streams) > 1:
+        raise BadInput(folder, "", f"holds {len(streams)} cases", f"name one: {', '.join(streams[:4])}, ..")
+    return streams[0] if streams else folder
+
+
+def _open_steps(options: DebugSubject) -> tuple[InspectedRun, list[str]] | None:
+    """The case of a scenario whose steps fail, and what failed; None for any other subject.
+
+    Of robots also the input of steps that pass: nothing else can repeat it.
+    """
+    if not options.subject.endswith(".toml") or is_board(options.subject) or options.resume is not None:
+        return None
+    options.plugins.bring()
+    text = load_any(options.subject, (*options.plugins.settings(options.settings), *options.settings))
+    if not text.scenario.step or options.expected:
+        return None
+    image = image_for(text, options.firmware)
+    spec = RunSpec.of(text, image, options.seed or 0)
+    run = Run.traced(msgspec.structs.replace(spec, expected=expectations_in(text), steps=steps_in(text)))
+    assert run.player is not None
+    with plain_parameters(options.subject), ProgressBar("doing its steps", None):
+        run.player.play()
+        case = run.case_of_step()
+        run.drive(move=run.player.finish)
+        run.finish()
+    failed = run.result().lines
+    if not failed and isinstance(text, BoardText):
+        return None  # a script of them is run
+    case = case or (run.case() if run.failures else run.stream())
+    with TemporaryDirectory() as folder:
+        path = os.path.join(folder, CASES[0])
+        with open(path, "w", encoding="utf-8") as file:
+            file.write(case)
+        given = msgspec.structs.replace(
+            options, subject=path, firmware=str(image.path), seed=None, settings=()
+        )
+        return open_run(given), [*failed]
+
+
+def _newer_sources(symbols: Symbols) -> list[str]:
+    """C files that were written after the image. The robot's own are installed together."""
+    image = symbols.image.path
+    if not image.is_file() or image.resolve() == image_path().resolve():
+        return []
+    files = {line.file for line in symbols.line_begins.values()}
+    paths = [path for file in files if (path := symbols.sources.path(file)) is not None]
+    built_s = image.stat().st_mtime + _SAME_TIME_S
+    return sorted(path.name for path in paths if path.stat().st_mtime > built_s)
 
 
 def _judged(timeline: Timeline, run: InspectedRun, job: Job) -> Result:

@@ -80,7 +80,7 @@ def test(options: TestOptions) -> int:
         results.append(result)
         tell_notes(note for note in result.left_out if note not in left_out)
         left_out |= dict.fromkeys(result.left_out)
-        _show(result, options.quiet)
+        _show(result, options)
         if options.pages and result.left and result.has_page:
             try:
                 leave_page(Path(result.left))
@@ -103,9 +103,9 @@ def _refuse_unused(files: Iterable[str], results: Sequence[Result]) -> None:
         raise BadInput("", "--expect", what, "leave it out, or name the one that the cases have in [expect]")
 
 
-def _show(result: Result, quiet: bool) -> None:
+def _show(result: Result, options: TestOptions) -> None:
     passed = result.verdict == "passed"
-    if quiet and passed:
+    if options.quiet and passed:
         return
     steps = f"{result.done} of {amount(result.steps, 'step')}, " if result.steps else ""
     digest = f", digest {result.digest[:12]}" if result.digest else ""  # of a robot at a port there is none
@@ -123,6 +123,8 @@ def _show(result: Result, quiet: bool) -> None:
         if result.has_page:
             show_line(f"    {report_line(result.left)}")
     if not passed and result.verdict != "error":
+        if result.done < result.steps and not result.left and (line := options.debug_line_for(result.path)):
+            show_line(f"    {line}")
         show_line(f"    {result.again}")
 
 

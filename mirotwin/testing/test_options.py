@@ -9,6 +9,7 @@ from mirotwin.desk.guard import DeskOptions
 from mirotwin.shell.command import Argument, Option, Options
 from mirotwin.shell.options import ARTIFACTS, JUNIT, NAME, QUIET, SET, Engine, Firmware, Seed
 from mirotwin.shell.plugin_files import PluginFiles
+from mirotwin.verify.cases.replay_line import DebugLineOptions
 from mirotwin.verify.expectations import Expected
 
 
@@ -37,6 +38,18 @@ class TestOptions(Options, frozen=True, kw_only=True):
     ] = False
     desk: DeskOptions = DeskOptions()
     quiet: Annotated[bool, QUIET.saying("No line for a file that passed.")] = False
+
+    def debug_line_for(self, file: str) -> str:
+        """The command that stands at the failed step of this scenario; "" where it cannot."""
+        if self.desk.port or self.expected or not file.endswith(".toml"):
+            return ""
+        return DebugLineOptions(
+            file=file,
+            firmware=self.firmware,
+            plugins=self.plugins,
+            seed=self.seed or None,
+            settings=self.settings,
+        ).command_line()
 
     def line_for(self, file: str, saves: bool = False) -> str:
         """The command that gives the verdict on this scenario again; one that saves worlds needs a folder for them."""

@@ -9,7 +9,7 @@ from typing import Annotated
 from miro_robot.firmware import image_path
 from miro_robot.image import Image
 from mirotwin.shell.command import Argument, Option, Options
-from mirotwin.shell.options import FIRMWARE, NAME
+from mirotwin.shell.options import FIRMWARE, NAME, SEED, SET
 from mirotwin.shell.plugin_files import NO_FILES, PluginFiles
 from mirotwin.verify.expectations import Expected
 
@@ -28,9 +28,11 @@ class CaseOptions(Options, frozen=True, kw_only=True):
 
 
 class DebugLineOptions(CaseOptions, frozen=True, kw_only=True):
-    """Options of `mirotwin debug` for a case or a recording; the command has more."""
+    """Options of `mirotwin debug` for a case, a recording or a scenario with steps; the command has more."""
 
     COMMAND = "debug"
+    seed: Annotated[int | None, SEED] = None
+    settings: Annotated[tuple[str, ...], SET] = ()
     at: Annotated[str, Option(help="Where to stand first.")] = ""
 
 

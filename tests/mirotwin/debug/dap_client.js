@@ -147,6 +147,26 @@ async function main() {
   await client.pauseRequest(thread);
   assert.strictEqual((await end).body.reason, 'pause');
   await assert.rejects(client.customRequest('restartFrame', { frameId: 1 }));
+
+  // lines with code, on to a line, no exception here, from the start again with the same breakpoints
+  const { body: lines } = await client.customRequest('breakpointLocations', { source: { path: failsafe }, line: 140, endLine: 150 });
+  assert.ok(lines.breakpoints.length > 3 && lines.breakpoints.every((one) => one.line >= 140 && one.line <= 150));
+  used.add('BreakpointLocationsRequest');
+  const { body: targets } = await client.customRequest('gotoTargets', { source: { path: failsafe }, line: 146 });
+  frames = await stop(client.customRequest('goto', { ...thread, targetId: targets.targets[0].id }), 'goto');
+  assert.strictEqual(frames[0].line, 146);
+  used.add('GotoTargetsRequest');
+  await client.setExceptionBreakpointsRequest({ filters: capabilities.exceptionBreakpointFilters.map((one) => one.filter) });
+  await assert.rejects(client.customRequest('exceptionInfo', thread));
+  used.add('ExceptionInfoRequest');
+  [set] = await breakpoints({ line: 146 });
+  const changed = client.waitForEvent('breakpoint', 60000);
+  await stop(client.customRequest('restart', {}), 'entry');
+  assert.strictEqual((await changed).body.breakpoint.id, set.id);
+  frames = await stop(client.continueRequest(thread), 'breakpoint');
+  assert.strictEqual(frames[0].line, 146);
+  await breakpoints();
+  used.add('RestartRequest');
   await assert.rejects(client.setVariableRequest({ variablesReference: 1, name: 'x', value: '1' })); // a robot has no parts
   used.add('SetVariable');
   const terminated = client.waitForEvent('terminated', 60000);
@@ -155,7 +175,7 @@ async function main() {
   await terminated;
   await client.disconnectRequest();
 
-  const announced = Object.keys(capabilities).filter((key) => capabilities[key]).map((key) => key.replace('supports', ''));
+  const announced = Object.keys(capabilities).filter((key) => key.startsWith('supports') && capabilities[key]).map((key) => key.replace('supports', ''));
   assert.deepStrictEqual([...used].sort(), announced.sort());
 }
 

@@ -8,6 +8,7 @@ import threading
 
 import pytest
 
+from mirotwin.debug import adapter as adapters
 from mirotwin.debug import debug_command
 from mirotwin.debug.adapter import Adapter
 from mirotwin.runs.inspected_run import InspectedRun
@@ -633,3 +634,127 @@ def test_a_value_of_a_part_that_is_set_is_put_and_stays_put_where_one_goes_back_
         refused = client.ask("setVariable", variablesReference=part("key"), name=name, value=value)
         assert not refused["success"]
         assert why.split(":")[0] in refused["message"]
+
+
+FAULTS_TWICE = """
+NOP
+again:
+DB 0A5h
+MOV R7,#200
+wait:
+DJNZ R7,wait
+SJMP again
+"""
+
+
+def test_a_fault_of_a_chosen_kind_stops_a_run_that_goes_on_past_it_and_says_which():
+    """Without its filter the run goes on."""
+    wire = ClientDuringARun()
+    run = InspectedRun(Alone(image(FAULTS_TWICE), stop_on_fault=False).world)
+    run.end_tick = 24_000_000 // 500
+    adapter = Adapter(wire)
+    adapter.use(debugger_of(run))
+
+    def goes_on():
+        adapter.answer({"seq": 1, "command": "continue", "arguments": {"threadId": 1}})
+        adapter.run_after()
+        return wire.events["stopped"]
+
+    filters = {"filters": ["UNDEFINED_OPCODE", "STACK_OVERFLOW"]}
+    adapter.answer({"seq": 1, "command": "setExceptionBreakpoints", "arguments": filters})
+    ticks = []
+    for _ in range(3):
+        stopped = goes_on()
+        assert stopped["reason"] == "exception"
+        info = adapter.on_exceptionInfo({"threadId": 1})
+        assert info["exceptionId"] == "UNDEFINED_OPCODE"
+        assert "executed the undefined opcode A5 at 0x0001" in info["description"]
+        ticks.append(adapter.timeline.tick)
+    assert ticks == sorted(set(ticks))
+    adapter.answer(
+        {"seq": 1, "command": "setExceptionBreakpoints", "arguments": {"filters": ["STACK_OVERFLOW"]}}
+    )
+    goes_on()
+    assert adapter.timeline.run.over
+
+
+def test_the_failed_check_of_a_case_is_an_exception_that_says_what_failed(adapter, tmp_path):
+    _, client = adapter
+    scenario = tmp_path / "steps.scenario.toml"
+    step = '[[step]]\nwait_for = "command"\nname = "RDSIGS"\nwithin_ms = 50\n'
+    scenario.write_text(f'scenario = "fig6"\nname = "steps"\nset.duration_s = 0.3\n{step}')
+    assert client.begin(subject=str(scenario))["reason"] == "exception"
+    info = client.ask("exceptionInfo", threadId=1)["body"]
+    assert info["exceptionId"] == "failed check"
+    assert "fails as recorded: happens: net0/robot0: tick " in info["description"]
+
+
+def test_a_session_ends_at_once_while_it_opens(adapter):
+    process, client = adapter
+    client.ask("initialize")
+    client.send("launch", subject="silent", set=["duration_s=600"], at="590s")
+    client.send("disconnect")
+    client.until(type="response", command="disconnect")
+    assert ended(process) == (0, "")
+
+
+def test_what_takes_longer_than_a_second_says_how_far_it_is(monkeypatch):
+    monkeypatch.setattr(adapters, "_PATIENCE_S", 0.0)
+    monkeypatch.setattr(adapters, "_PROGRESS_S", 0.0)
+    wire = ClientDuringARun()
+    all_events = []
+    wire.send = lambda message: all_events.append((message.get("event"), message.get("body")))
+    own = Adapter(wire)
+    own.on_initialize({"supportsProgressReporting": True})
+    own.use(debugger_of(robot_run()))
+    for expected in ("1", "2"):
+        own.its.go_to(0)
+        own.answer({"seq": 1, "command": "continue", "arguments": {"threadId": 1}})
+        all_events.clear()
+        own.run_after()
+        told = [(event, body) for event, body in all_events if event and event.startswith("progress")]
+        assert [told[0][0], told[1][0], told[-1][0]] == ["progressStart", "progressUpdate", "progressEnd"]
+        assert {body["progressId"] for _, body in told} == {expected}
+        shares = [body["percentage"] for event, body in told[:-1]]
+        assert shares == sorted(shares)
+        assert 0 < shares[0] < shares[-1] <= 100
+    all_events.clear()
+    own.on_initialize({})
+    own.its.go_to(0)
+    own.answer({"seq": 1, "command": "continue", "arguments": {"threadId": 1}})
+    own.run_after()
+    assert not [event for event, _ in all_events if event and event.startswith("progress")]
+
+
+def test_nothing_of_a_run_can_be_set_and_the_answer_says_why(adapter):
+    _, client = adapter
+    client.begin(subject="fig6", at="100ms")
+    frame = client.ask("stackTrace", threadId=1)["body"]["stackFrames"][0]["id"]
+    scopes = {one["name"]: one for one in client.ask("scopes", frameId=frame)["body"]["scopes"]}
+    reference = scopes["Globals"]["variablesReference"]
+    for refused in (
+        client.ask("setVariable", variablesReference=reference, name="slot", value="1"),
+        client.ask("setExpression", expression="slot", value="1"),
+        client.ask("writeMemory", memoryReference="0:iram:0x30", data="AA=="),
+    ):
+        assert "a run is bits, and with another value it would be another run" in refused["message"]
+
+
+def test_a_restart_reads_the_image_again_and_finds_breakpoints_by_their_names(adapter, tmp_path):
+    _, client = adapter
+    firmware = tmp_path / "own.ihx"
+    hex_file(firmware, assemble("main:\nINC 30h\nSJMP main"))
+    client.begin(subject=str(firmware))
+    client.ask("setInstructionBreakpoints", breakpoints=[{"instructionReference": "0x2"}])
+    data = [{"dataId": "iram:48:1"}]
+    number = client.ask("setDataBreakpoints", breakpoints=data)["body"]["breakpoints"][0]["id"]
+    hex_file(firmware, assemble("main:\nNOP\nINC 30h\nSJMP main"))
+    client.send("restart")
+    events = [client.until(event="breakpoint")["body"]["breakpoint"] for _ in range(2)]
+    assert [one["verified"] for one in events] == [True, True]
+    assert events[1]["id"] == number
+    client.until(event="stopped")
+    client.send("continue", threadId=1)
+    stopped = client.until(event="stopped")["body"]
+    assert (stopped["reason"], stopped["hitBreakpointIds"]) == ("data breakpoint", [number])
+    assert client.ask("evaluate", expression="PC")["body"]["result"].split()[0] == "1"

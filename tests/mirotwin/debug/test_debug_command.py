@@ -293,3 +293,65 @@ def test_ctrl_c_ends_a_list_of_commands(monkeypatch):
     assert "continue" in done.output
     assert "print tick" not in done.output
     assert done.exit_code != 0
+
+
+FAILING = """
+scenario = "fig6"
+duration_s = 0.3
+[[step]]
+wait_for = "frame"
+within_ms = 100
+[[step]]
+wait_for = "command"
+name = "RDSIGS"
+within_ms = 50
+"""
+
+
+def test_a_scenario_with_steps_stands_at_the_step_that_fails_and_test_says_the_line(mirotwin, tmp_path):
+    scenario = tmp_path / "steps.scenario.toml"
+    scenario.write_text(FAILING.replace("duration_s = 0.3", 'name = "steps"\nset.duration_s = 0.3'))
+    said = mirotwin("test", scenario, "--seed", 3)[1]
+    line = f"    mirotwin debug {scenario} --seed 3\n"
+    assert line in said
+    words = line.split()[2:]
+    out = mirotwin.succeeds("debug", *words, *commands("rcontinue"))
+    assert "step failed: step 2: wait_for command: tick " in out
+    assert "fails as recorded: happens: net0/robot0: tick " in out
+    assert "  case: main.c:" in out
+    assert "  the run begins here: " in out
+    passing = tmp_path / "pass.scenario.toml"
+    passing.write_text(
+        scenario.read_text().replace("RDSIGS", "RDSTAT").replace("within_ms = 50", "within_ms = 250")
+    )
+    if "passed" in mirotwin("test", passing)[1]:
+        assert "begin: 0x0000 in reset" in mirotwin.succeeds("debug", passing, *commands("where"))
+
+
+def test_a_folder_of_artifacts_opens_its_only_case_and_names_several(mirotwin, console, tmp_path):
+    for name in ("one", "two"):
+        scenario = tmp_path / f"{name}.scenario.toml"
+        scenario.write_text(
+            f'scenario = "fig6"\nname = "{name}"\nset.duration_s = 0.3\nexpect.frames_accepted_min = 50\n'
+        )
+        mirotwin.ends(1, "test", scenario, "--artifacts", tmp_path / "left" / name)
+    assert "fails as recorded: frames_accepted_min: " in console(tmp_path / "left" / "one", lines=["where"])
+    both = tmp_path / "both"
+    both.mkdir()
+    for name in ("one", "two"):
+        case = next((tmp_path / "left" / name).rglob("case.stream"))
+        shutil.copytree(case.parent, both / name)
+    refused = mirotwin.refuses("debug", both, *commands("where"))
+    assert "holds 2 cases; name one: " in refused
+
+
+def test_sources_that_are_newer_than_the_image_are_told(console, tmp_path):
+    for suffix, text in (".ihx", hex_text(ECHO)), (".cdb", ECHO_CDB), (".map", ECHO_MAP):
+        (tmp_path / f"named{suffix}").write_text(text)
+    (tmp_path / "named.c").write_text("")
+    words = ("--sources", tmp_path)
+    os.utime(tmp_path / "named.c", (0, (tmp_path / "named.ihx").stat().st_mtime - 10))
+    assert "newer" not in console(tmp_path / "named.ihx", *words, lines=["where"])
+    os.utime(tmp_path / "named.c", (0, (tmp_path / "named.ihx").stat().st_mtime + 10))
+    told = console(tmp_path / "named.ihx", *words, lines=["where"])
+    assert "newer than named.ihx: named.c; lines may not fit, build it again" in told

@@ -48,10 +48,10 @@ def test_each_file_has_a_line_with_its_verdict_and_one_for_each_failure(mirotwin
     assert lines[0].startswith("passed  hil/a.scenario.toml (3 of 3 steps, 500.500 ms, digest ")
     assert lines[1].startswith("FAILED  hil/sub/b.scenario.toml (2 of 3 steps, ")
     assert lines[2].startswith(f"    step failed: {TOO_SOON} wanted answer within 20 ms, found only ")
-    assert lines[3] == "    mirotwin test hil/sub/b.scenario.toml"
-    assert lines[4] == "ERROR  hil/sub/c.scenario.toml"
-    assert lines[5].endswith("c.scenario.toml: step 3.within_s: unknown key; use within_ms, in milliseconds")
-    assert lines[7].startswith("    expectation failed: failsafe_stop_ms: net0/robot0: tick ")
+    assert lines[3:5] == [f"    mirotwin {verb} hil/sub/b.scenario.toml" for verb in ("debug", "test")]
+    assert lines[5] == "ERROR  hil/sub/c.scenario.toml"
+    assert lines[6].endswith("c.scenario.toml: step 3.within_s: unknown key; use within_ms, in milliseconds")
+    assert lines[8].startswith("    expectation failed: failsafe_stop_ms: net0/robot0: tick ")
     assert lines[-1] == "1 cannot be run, 3 failed, 1 passed"
 
 
