@@ -74,5 +74,6 @@ REFERENCES: Registry[AnyReference] = Registry(
         "arc": "miro_host.references.arc:ArcRef",
         "sine": "miro_host.references.sine:SineRef",
         "waypoints": "miro_host.references.waypoints:WaypointsRef",
+        "timed": "miro_host.references.timed:TimedRef",
     },
 )

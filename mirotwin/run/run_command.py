@@ -151,11 +151,14 @@ def _duration(options: RunOptions, settings: tuple[str, ...]) -> tuple[str, ...]
 
 
 def _table(summary: AnySummary, run_files: RunFiles, folder: Path) -> Table:
+    from miro_host.laws.interface import LawParameters
     from mirotwin.run.board_table import board_table  # load rich
     from mirotwin.run.run_table import table_of
 
     if isinstance(summary, Summary):
-        return table_of(summary, run_files.tracks, folder)
+        law = run_files.run.world.scenario.networks[0].robot[0].controller
+        polar = isinstance(law, LawParameters) and law.ORIGIN_CLEARANCE_M > 0.0
+        return table_of(summary, run_files.tracks, folder, polar)
     return board_table(summary, run_files.serial, f"{run_files.run.world.image.path}", folder)
 
 

@@ -16,7 +16,8 @@ from mirotwin.runs.summary import Summary, off_pitch_text, rms_name, settling_te
 from mirotwin.shell.console import facts_table
 
 
-def table_of(summary: Summary, tracks: Tracks, folder: Path) -> Table:
+def table_of(summary: Summary, tracks: Tracks, folder: Path, polar: bool) -> Table:
+    """`polar`: whether the first robot's law is one that the paper's theory is about."""
     tracking, link = summary.tracking, summary.link
     table = begun_table(summary, "errors, theory and checks from there; camera, link and firmware from 0 s")
     if tracking.rms_position_cm is not None:
@@ -27,7 +28,7 @@ def table_of(summary: Summary, tracks: Tracks, folder: Path) -> Table:
             f"y {tracking.rms_y_cm:.2f}), {tracking.rms_theta_deg:.2f} deg; {settling_text(errors)}",
         )
     theory = theory_text(summary.theory) if summary.theory is not None else ""
-    if theory:
+    if theory and polar:
         table.add_row("theory", theory)
     off_pitch = off_pitch_text(summary)
     if off_pitch:

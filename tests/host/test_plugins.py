@@ -225,7 +225,7 @@ class Late:
 
 
 def test_our_own_references_are_found_by_their_names():
-    assert REFERENCES.names() == ["line", "arc", "sine", "waypoints"]
+    assert REFERENCES.names() == ["line", "arc", "sine", "waypoints", "timed"]
     for name in REFERENCES.names():
         assert REFERENCES.find(name).name() == name
     assert isinstance(LineRef(heading_deg=90.0).trajectory(2.0), StraightLine)

@@ -28,7 +28,7 @@ reference.kind = "line"
 """
 CAMERAS = "pixels, geometric or gaussian"
 LAW_CHOICES = use_one_of(LAWS.own)
-REFERENCES = "line, arc, sine or waypoints"
+REFERENCES = "line, arc, sine, waypoints or timed"
 NO_ARRAY = "expected an array of tables, got a table"
 
 

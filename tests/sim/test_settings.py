@@ -286,7 +286,7 @@ def test_what_an_error_advises_to_write_is_accepted(source, setting):
 
 @pytest.mark.parametrize("source", ["fig6", str(TWO_TEAMS)])
 def test_a_law_and_an_estimator_may_be_those_of_all_robots(source):
-    made = load(source, ["law=kanayama", "estimator=predict"]).scenario
+    made = load(source, ['law="kanayama"', "estimator=predict"]).scenario
     robots = [robot for network in made.networks for robot in network.robot]
     assert {robot.controller.name() for robot in robots} == {"kanayama"}
     assert {robot.estimator.name() for robot in robots} == {"predict"}

@@ -75,7 +75,8 @@ class LawParameters(
     (`typing.Annotated` with `msgspec.Meta`), and define `law`.
 
     A law in polar coordinates states how near the origin of the world axes its reference may come, once it has left it,
-    as `ORIGIN_CLEARANCE_M`; scenarios with another reference are refused. 0: the law knows no origin.
+    as `ORIGIN_CLEARANCE_M`; scenarios with another reference are refused. The paper's assumptions are about such laws,
+    and shown for them alone. 0: the law knows no origin.
     """
 
     ORIGIN_CLEARANCE_M: ClassVar[float] = 0.0

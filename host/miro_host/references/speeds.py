@@ -42,9 +42,17 @@ class Lap(msgspec.Struct, frozen=True):
         return self.times_s[-1]
 
 
-def at_nodes(bounds: Bounds, curvatures_per_m: Sequence[float], closed: bool) -> list[float]:
-    """Squares of speed that the nodes allow: the stricter of the cells beside a node counts."""
+def at_nodes(
+    bounds: Bounds, curvatures_per_m: Sequence[float], closed: bool, limits_m_s: Sequence[float | None] = ()
+) -> list[float]:
+    """Squares of speed that the nodes allow: the stricter of the cells beside a node counts.
+
+    `limits_m_s`: more bounds of speed, of each cell or of none.
+    """
     cells = [bounds.square(curvature) for curvature in curvatures_per_m]
+    for number, limit in enumerate(limits_m_s):
+        if limit is not None:
+            cells[number] = min(cells[number], limit * limit)
     around = min(cells[0], cells[-1]) if closed else 0.0
     inner = [min(before, after) for before, after in pairwise(cells)]
     return [around, *inner, around]

@@ -39,12 +39,15 @@ LEAST_CM = 7.5
 MOST_POINTS = 200
 MOST_CURVATURE_PER_M = 100.0
 LEAST_RATE = 0.05
+Speed = Annotated[float, Meta(ge=0.01, le=1.46)]
 GAUSS = ((0.1127016653792583, 5.0 / 18.0), (0.5, 8.0 / 18.0), (0.8872983346207417, 5.0 / 18.0))
 """Gauss and Legendre's three points in 0 to 1, and their weights."""
 
 
 class Waypoints:
     """A trajectory through `points` in m, with `given` headings in rad or None, within `bounds`.
+
+    `limits_m_s`: the greatest speed from each point to the next, or None; it may be left out.
 
     ValueError for a path that cannot be driven: one that turns back on itself or bends to less than 1 cm.
     """
@@ -55,6 +58,7 @@ class Waypoints:
         given: list[float | None],
         bounds: Bounds,
         closed: bool = False,
+        limits_m_s: Sequence[float | None] = (),
     ) -> None:
         self.closed = closed
         self.bounds = bounds
@@ -63,7 +67,8 @@ class Waypoints:
         curvatures: list[float] = []
         for number, piece in enumerate(self.pieces):
             self._tabulate(piece, number, curvatures)
-        squares = at_nodes(bounds, curvatures, closed)
+        limits = [limit for limit in limits_m_s[: len(self.pieces)] for _ in range(CELLS)]
+        squares = at_nodes(bounds, curvatures, closed, limits)
         lap = smooth(squares, self.ways_m, bounds.accel_m_s2, closed)
         self.lap = timed(lap, self.ways_m)
         self.start = timed(run_up(lap, self.ways_m, bounds.accel_m_s2), self.ways_m) if closed else self.lap
@@ -146,11 +151,15 @@ def _way(piece: SplinePiece, first: float, last: float) -> float:
 
 
 class Waypoint(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_only=True):
-    """One point of a path; without a heading it gets that of the circle through it and its neighbours."""
+    """One point of a path; without a heading it gets that of the circle through it and its neighbours.
+
+    `speed_m_s`: the greatest from here to the next point, if that is less than the one of the whole path.
+    """
 
     x_cm: Cm
     y_cm: Cm
     heading_deg: TurnDeg | None = None
+    speed_m_s: Speed | None = None
 
 
 class WaypointsRef(ReferenceParameters, frozen=True, kw_only=True, tag="waypoints"):
@@ -162,7 +171,7 @@ class WaypointsRef(ReferenceParameters, frozen=True, kw_only=True, tag="waypoint
 
     points: tuple[Waypoint, ...]
     closed: bool = False
-    speed_m_s: Annotated[float, Meta(ge=0.01, le=1.46)] = 0.20
+    speed_m_s: Speed = 0.20
     accel_m_s2: Annotated[float, Meta(ge=0.01, le=100.0)] = 0.40
     lateral_accel_m_s2: Annotated[float, Meta(ge=0.01, le=100.0)] = 0.40
     turn_rad_s: Annotated[float, Meta(ge=0.01, le=100.0)] = 3.0
@@ -197,6 +206,7 @@ def _planned(keys: WaypointsRef) -> Waypoints:
         [None if point.heading_deg is None else point.heading_deg * DEGREE for point in keys.points],
         Bounds(keys.speed_m_s, keys.accel_m_s2, keys.lateral_accel_m_s2, keys.turn_rad_s),
         keys.closed,
+        [point.speed_m_s for point in keys.points],
     )
 
 

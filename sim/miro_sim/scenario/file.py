@@ -18,6 +18,7 @@ from miro_protocol.toml_text import TEXT_KIB, check_numbers, tables, without_non
 from miro_sim.scenario.base import is_path, with_base
 from miro_sim.scenario.errors import ScenarioError, value_error
 from miro_sim.scenario.keys import Scenario, scenario_of
+from miro_sim.scenario.paths import put_paths
 from miro_sim.scenario.plugins import cause_of, full_message
 from miro_sim.scenario.profiles import with_profiles
 from miro_sim.scenario.settings import Setting, blamed, drop_other_kind, make
@@ -90,10 +91,17 @@ def load(source: str, settings: Sequence[str] = ()) -> ScenarioText:
 def of_text(text: str, origin: str, settings: Sequence[str] = ()) -> ScenarioText:
     """As `load`, of a text that `origin` names."""
     raw = tables_of(text, origin)
-    whole, own = with_base(raw, origin, lambda source: tables_of(source_text(source), source))
+    whole, own = with_base(raw, origin, _base_tables)
+    with_points = put_paths(whole, origin)
     made = _checked(whole, origin, settings, own)
-    same = whole is raw and not settings
+    same = whole is raw and not settings and not with_points
     return msgspec.structs.replace(made, source=text, tables=None if same else whole)
+
+
+def _base_tables(source: str) -> dict[str, Any]:
+    raw = tables_of(source_text(source), source)
+    put_paths(raw, source)
+    return raw
 
 
 def source_text(source: str) -> str:
@@ -162,6 +170,9 @@ def _checked(
     A setting that chooses another kind of something leaves the old kind's keys out; a note for each says which.
     """
     made = [*own, *make(raw, settings, origin)]
+    put_paths(
+        raw, origin, in_file=False
+    )  # that a setting names: a campaign's workers would read it at other times
     dropped: dict[str, list[str]] = {}
     while True:
         try:

@@ -109,7 +109,8 @@ def make(raw: Table, settings: Iterable[str], origin: str, option: str = OPTION)
 
 def _of_all(raw: Table, text: str) -> list[str]:
     """`law=NAME` as the settings of all robots, none where one of them has it; any other setting as it is."""
-    word, _, name = text.partition("=")
+    word, _, value = text.partition("=")
+    name = value.strip("\"' ")
     if word not in _OF_ALL:
         return [text]
     table, key = _OF_ALL[word], TABLES[_OF_ALL[word]]
@@ -120,7 +121,7 @@ def _of_all(raw: Table, text: str) -> list[str]:
     }
     if any(table_of(robot.get(table)).get(key) == name for robot in robots.values()):
         return []
-    return [f"{path}.{table}.{key}={name}" for path in robots]
+    return [f"{path}.{table}.{key}={value}" for path in robots]
 
 
 def _make(raw: Table, text: str, origin: str, option: str) -> Setting:

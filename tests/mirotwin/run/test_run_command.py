@@ -60,6 +60,15 @@ def test_the_table_names_what_matters(mirotwin, short, tmp_path):
         assert word in out
 
 
+def test_the_papers_theory_is_a_line_of_the_table_for_laws_that_it_is_about(mirotwin, tmp_path):
+    words = ("run", "fig7", "--set", "duration_s=0.5", "--no-figure", "--out")
+    _, polar, _ = mirotwin(*words, tmp_path / "polar")
+    _, other, _ = mirotwin(*words, tmp_path / "other", "--set", "law=kanayama")
+    assert "theory " in polar
+    assert "theory " not in other
+    assert json.loads((tmp_path / "other/summary.json").read_text())["theory"]["effort_m_s2"] > 0.0
+
+
 def test_a_finished_run_in_the_folder_of_its_scenario_and_seed_is_replaced_and_nothing_else(
     mirotwin, short, tmp_path, monkeypatch
 ):
