@@ -14,6 +14,7 @@ from mirotwin.shell.command import Argument, Option, Options, command_of, operan
 from mirotwin.shell.options import BOARD, FORCE, PATH
 from mirotwin.shell.outputs import reason_of, some, write_files
 from mirotwin.testing import origin
+from mirotwin.testing.vsix import packed
 
 _IN_WHEEL = Path(__file__).parent / "examples"
 _IN_TREE = Path(__file__).parents[2] / "examples"
@@ -27,7 +28,7 @@ EXAMPLES = {
     "fuzz-slip": "An 8051 firmware that is no robot, its wire format, its check.",
     "boards": "8051 boards, firmware, tests: cars, line follower, Modbus, RS485.",
     "foxglove": "A layout for Foxglove.",
-    "vscode": "The extension for VS Code: debugging firmware, backwards too.",
+    "vscode": "The extension for VS Code, ready to install: debugs firmware.",
 }
 """Name, and what `mirotwin examples` says of it."""
 PROJECT, BOARDS = "hil", "boards"
@@ -59,6 +60,17 @@ def example_files(name: str) -> Iterator[tuple[str, Path]]:
     else:
         (path,) = folder().glob(f"{name}.*")
         yield path.name, path
+
+
+EXTENSION, VSIX = "vscode", "mirotwin-debug.vsix"
+
+
+def contents_of(name: str) -> dict[str, bytes]:
+    """What is written of an example, by name. Raises BadInput as `example_files` does."""
+    files = {example: path.read_bytes() for example, path in example_files(name)}
+    if name != EXTENSION:
+        return files
+    return {VSIX: packed({example.removeprefix(f"{EXTENSION}/"): data for example, data in files.items()})}
 
 
 def _images() -> Iterator[tuple[str, Path]]:
@@ -166,7 +178,7 @@ def examples(options: ExamplesOptions) -> None:
         click.echo("write one here: mirotwin examples NAME")
         return
     remedy = "name another folder, or replace with --force"
-    files = {example: path.read_bytes() for example, path in example_files(name)}
+    files = contents_of(name)
     write(folder, files, remedy, options.force)
     for example in files:
         click.echo(folder / example)

@@ -59,8 +59,7 @@ def copy_image(image, target):
 
 def copy_examples(folder):
     for name in starter.EXAMPLES:
-        files = {file: path.read_bytes() for file, path in starter.example_files(name)}
-        starter.write(folder, files, "", force=True)
+        starter.write(folder, starter.contents_of(name), "", force=True)
 
 
 def put_parts(hidden):

@@ -33,7 +33,7 @@ def test_all_that_lies_in_the_folder_can_be_written():
 def test_an_example_is_written_file_by_file(mirotwin, tmp_path, name):
     out = mirotwin.succeeds("examples", name, tmp_path / "here")
     written = [Path(line) for line in out.splitlines()]
-    assert written == [tmp_path / "here" / one for one, _ in starter.example_files(name)]
+    assert written == [tmp_path / "here" / one for one in starter.contents_of(name)]
     assert all(path.is_file() for path in written)
 
 
