@@ -25,6 +25,7 @@ from mirotwin.shell.firmware_image import image_for
 from mirotwin.shell.held_signals import held_signals
 from mirotwin.shell.options import plain_parameters
 from mirotwin.shell.outputs import FILES, OutputFolder
+from mirotwin.shell.plugin_files import unused_in
 from mirotwin.shell.program import complain, tell_notes
 from mirotwin.shell.progress import ProgressBar
 from mirotwin.verify.checks.expect import expectations_in
@@ -73,7 +74,7 @@ def run(options: RunOptions) -> int:
     if alone and (given := options.given("frames", "record_frames", "record")):
         raise click.UsageError(f"{given[0]} is for robots, and {options.scenario} is for a board.")
     expected, steps = expectations_in(text), steps_in(text)
-    tell_notes(text.notes)
+    tell_notes((*text.notes, *unused_in(text.scenario)))
     if steps and record == "full":
         raise click.UsageError(f"--record full does not go with the steps of {options.scenario}.")
     stops = Stops(options.save_at, options.to_time, options.resume, text.scenario.clock)

@@ -8,12 +8,15 @@ from collections.abc import Iterator, Sequence
 from pathlib import Path
 from typing import Annotated, Any
 
+import msgspec
+
 from miro_exact import installed
 from miro_exact.bad_input import BadInput
 from miro_exact.plugins import Registry
 from miro_host.registries import ESTIMATORS, LAWS, REFERENCES
 from miro_sim.scenario.board_file import check_struct
 from miro_sim.scenario.parts import PARTS
+from miro_sim.scenario.plugins import plugins_used
 from mirotwin.shell.command import Option, Options
 
 FORM = "FILE.py:CLASS"
@@ -66,6 +69,16 @@ class PluginFiles(Options, frozen=True, kw_only=True):
 
 
 NO_FILES = PluginFiles()
+
+
+def unused_in(scenario: msgspec.Struct) -> list[str]:
+    """A line for each plug-in of a file that the scenario does not name."""
+    used = plugins_used(scenario, "{} {}".format)
+    return [
+        f"--{kind}: the scenario has no {kind} {name!r}, which the file brings; name it there, or by --set"
+        for kind, name in installed.in_files
+        if f"{kind} {name}" not in used
+    ]
 
 
 def _bring(registry: Registry[Any], given: Sequence[str], option: str) -> None:

@@ -65,6 +65,19 @@ def test_a_scenario_names_no_file_outside_of_its_folder(folder, name):
         load(str(path))
 
 
+@pytest.mark.parametrize("name", OUTSIDE)
+def test_the_path_of_a_reference_lies_in_the_folder_of_its_scenario(folder, name):
+    path = folder / "s.toml"
+    (folder.parent / "secret.csv").write_text("t,x,y\n0,40,40\n1,50,40\n")
+    (folder / "link.csv").symlink_to(folder.parent / "secret.csv")
+    file = quoted(name.format(folder=folder.parent, suffix=".csv"))
+    path.write_text(f'scenario = "below/mine.toml"\nset = {{ network.robot.0.reference.file = {file} }}\n')
+    with pytest.raises(
+        BadInput, match=r"reference.file: .* lies outside of the folder of the file that names it"
+    ):
+        load(str(path))
+
+
 def test_what_lies_in_the_folder_or_below_is_read_from_wherever_the_program_runs(folder, monkeypatch):
     (folder / "s.toml").write_text('scenario = "below/mine.toml"\nduration_s = 0.1\n')
     text = 'scenario = "s.toml"\n[grid]\nfirmware = ["", "below/mine.ihx", "below/../below/mine.ihx"]\n'

@@ -72,8 +72,12 @@ def test_it_steers_only_those_robots_for_which_the_scenario_or_a_setting_names_i
 
 def test_of_two_laws_the_scenario_says_which_steers_which(mirotwin, here):
     both = ("--law", LAW, "--law", OTHER)
-    mirotwin("run", "short.toml", *OPTIONS, *both, "--out", "neither")
+    _, _, err = mirotwin("run", "short.toml", *OPTIONS, *both, "--out", "neither")
     assert laws_in(here / "neither") == [None, None]
+    notes = [
+        f"mirotwin: note: --law: the scenario has no law {name!r}, " for name in ("samson", "pure_pursuit")
+    ]
+    assert [line.startswith(note) for line, note in zip(err.splitlines(), notes, strict=True)] == [True, True]
     keys = [
         f"network.robot.{place}.controller.law={name}"
         for place, name in enumerate(("samson", "pure_pursuit"))
