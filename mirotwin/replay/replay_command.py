@@ -123,15 +123,14 @@ def replay(options: ReplayOptions) -> int:
     job, images = _loaded(file, options)
     if options.desk.port:
         job = _sent_to_port(job, options)
+    elif job.origin or job.case.verdict or job.alone:
+        reason = "is for a stream, a capture or a recording of a twin"
+        refuse_given(file, reason, options.given("out", "force"))
     if job.origin:
         return _compare_with_twin(job, options)
     if options.compare.kind == "answers":
         reason = "is for robots at a port, and this was recorded at none"
         raise BadInput(file, "--compare answers", reason, "give --port, or another comparison")
-    if job.case.verdict or job.alone:
-        refuse_given(
-            file, "is for a stream, a capture or a recording of robots", options.given("out", "force")
-        )
     if job.case.verdict or (job.alone and not job.recorded):
         return _replay_case(job, options)
     return _compare_with_recorded(job, images, options)

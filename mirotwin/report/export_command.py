@@ -1,4 +1,4 @@
-"""`mirotwin export`: the characters of a run, or all of it, as a file for other programs."""
+"""`mirotwin export`: the characters of a run, or all of it, as files for other programs."""
 
 from __future__ import annotations
 
@@ -9,6 +9,7 @@ from pathlib import Path
 from typing import Annotated
 
 import click
+from msgspec.structs import replace
 
 from miro_exact.bad_input import BadInput, amount
 from miro_exact.inputs import check_memory
@@ -27,11 +28,12 @@ from mirotwin.runs.job import Job, load_job
 from mirotwin.shell.command import Argument, Option, Options, command_of
 from mirotwin.shell.console import show
 from mirotwin.shell.options import FIRMWARE, FORCE, NAME, NETWORK, OUT, QUIET, Engine
-from mirotwin.shell.outputs import check_new, whole_file
+from mirotwin.shell.outputs import RECORDINGS, check_new, file_in, whole_file
 from mirotwin.shell.plugin_files import PluginFiles
 from mirotwin.shell.program import complain
 from mirotwin.shell.progress import ProgressBar
 from mirotwin.shell.verdicts import BAD_INPUT, DONE
+from mirotwin.verify.cases.artifacts import CASES
 
 
 def export_foxglove(given: Input, form: Form, out: str, quiet: bool) -> int:
@@ -104,7 +106,7 @@ class Exported:
 
 class ExportOptions(Options, frozen=True, kw_only=True):
     COMMAND = "export"
-    file: Annotated[str, Argument("FILE|-", NAME)]
+    file: Annotated[str, Argument("RUN|FILE|-", NAME)]
     out: Annotated[str, OUT.saying("File to write, or - for standard output.", type=NAME)]
     target: Annotated[
         str | None,
@@ -132,10 +134,10 @@ class ExportOptions(Options, frozen=True, kw_only=True):
 
 @command_of(ExportOptions)
 def export(options: ExportOptions) -> int:
-    """Writes the characters in FILE as pcapng or as a stream file, or a recording for Foxglove.
+    """Writes the characters in FILE as pcapng or as a stream file, all channels as CSV, or a recording for Foxglove.
 
-    FILE is a recording, a stream file, or a capture of any form that `mirotwin decode` reads; one without times needs
-    --assume-contiguous.
+    RUN is the folder of a run; FILE is a recording, a stream file, or a capture of any form that `mirotwin decode`
+    reads; one without times needs --assume-contiguous.
 
     pcapng is for Wireshark and tshark: one packet a transmission (characters without a pause), with virtual time,
     direction, and the network as interface; link type 250 (RTAC serial). A script for Wireshark shows the
@@ -166,6 +168,7 @@ def export(options: ExportOptions) -> int:
     The stream file of a board's run holds the board, what was put into its parts, and what it sent. For CSV it is run
     again: the table `changes` says how all nets and values of parts stood, and each change, with its tick.
     """
+    options = replace(options, file=file_in(options.file, (*RECORDINGS, *CASES)))
     out, network, quiet = options.out, options.network, options.quiet
     to = "csv" if options.channel and out == STDIN else target_of(out, options.target)
     if to == "foxglove" and network is not None:

@@ -128,6 +128,12 @@ def test_what_no_port_shows_cannot_be_compared_and_nothing_is_sent(mirotwin, dri
     assert f"{option[-2]}: {said}" in mirotwin.ends(2, "replay", "desk", *option)
 
 
+def test_a_recording_made_at_a_port_is_compared_and_not_recorded_again(mirotwin, drive):
+    mirotwin("replay", drive, *TO_ROBOT, "--out", "desk")
+    said = mirotwin.ends(2, "replay", "desk", "--out", "again", "-q")
+    assert "--out: is for a stream, a capture or a recording of a twin; leave it out" in said
+
+
 def test_answers_are_compared_at_ports_only(mirotwin, finished):
     assert "is for robots at a port" in mirotwin.refuses("replay", finished, "--compare", "answers")
 

@@ -155,7 +155,7 @@ def test_a_case_is_not_recorded(mirotwin, tmp_path):
     head = '# mirotwin stream 2\n#: verdict = "no_fault: x"\n#:\n#: [expect]\n#: no_fault = true\n1000 > 55\n'
     (tmp_path / "case.stream").write_text(head)
     said = mirotwin.refuses("replay", tmp_path / "case.stream", "--out", tmp_path / "x")
-    assert "--out: is for a stream, a capture or a recording of robots; leave it out" in said
+    assert "--out: is for a stream, a capture or a recording of a twin; leave it out" in said
 
 
 @given(st.lists(st.booleans(), max_size=60))

@@ -93,6 +93,11 @@ def test_one_channel_is_one_file_or_standard_output(mirotwin, finished, exported
     assert mirotwin.succeeds("export", finished / "run.mcap", "--out", "-", "--channel", f"/{name}") == whole
 
 
+def test_the_folder_of_a_run_stands_for_its_recording(mirotwin, finished, tmp_path):
+    mirotwin.succeeds("export", finished, "--out", tmp_path / "run.csv", "--channel", "period", "-q")
+    assert len((tmp_path / "run.csv").read_text().splitlines()) == 7
+
+
 def test_a_channel_that_is_not_there_is_refused_with_those_that_are(mirotwin, finished, tmp_path):
     said = mirotwin.refuses(
         "export", finished / "run.mcap", "--out", tmp_path / "a.csv", "--channel", "truth"
