@@ -47,8 +47,8 @@ def debug(options: DebugOptions) -> int:
     """Steps through the firmware of SUBJECT, forwards and backwards.
 
     SUBJECT is a scenario, an image (on the bare processor, or on --board), a board file with --firmware, a recording, a
-    stream file, or a case, which stands at its failed check. `help` lists the commands. With --dap or --listen an
-    editor says what is debugged.
+    stream file, or a case, which stands at its failed check, as a scenario with steps does at the one that fails.
+    `help` lists the commands. With --dap or --listen an editor says what is debugged.
     """
     if options.listen is not None:
         return _listen(options.listen)

@@ -214,7 +214,7 @@ def _applied(apply: Callable[..., Any], sign: str, *terms: Term) -> Term:
     def applied(moment: Lookup) -> Value:
         try:
             operands = [read(term(moment)) for term in terms]
-            if len({isinstance(value, str) for value in operands}) > 1:
+            if read is operand and len({isinstance(value, str) for value in operands}) > 1:
                 raise NoValue(f"{sign} compares a text and a number")
             result = apply(*operands)
             float(result)  # so that numbers do not grow without end

@@ -35,7 +35,7 @@ def shown(value: Value, form: str = "") -> str:
     text = text_in(value, always=form == "s")
     whole = content(value)
     if form not in ("", "s"):
-        return in_form(whole, form, _size(value))
+        return in_form(whole, form, _size(value, whole))
     if text is None:
         return quoted(whole) if isinstance(whole, str) else shown_value(whole)
     return f"{shown_value(whole)} {quoted(text)}" if isinstance(whole, int) else quoted(text)
@@ -100,9 +100,11 @@ def as_text(data: bytes, always: bool) -> str | None:
     return None
 
 
-def _size(value: Value) -> int:
-    """Bytes of the number that it is, or of those that it is made of."""
+def _size(value: Value, whole: Any) -> int:
+    """Bytes of the number that it is, or of those that it is made of; of one without a type as many as it needs."""
     kind = value.kind
     while kind is not None and kind.kind == "array" and kind.element is not None:
         kind = kind.element
-    return 4 if kind is None else kind.size
+    if kind is not None:
+        return kind.size
+    return 4 if not isinstance(whole, int) or whole < 0 else max(1, (whole.bit_length() + 7) // 8)

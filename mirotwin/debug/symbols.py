@@ -158,7 +158,7 @@ class Moment:
         if not module and (local := self._local_meaning(name)):
             return local
         if variable := self._variable(name, module):
-            return lambda moment: moment.placed(variable)
+            return self._placing(variable)
         if not module and (special := self._special(name)):
             return special
         symbol = self.symbols.image.symbols.find(name)
@@ -177,6 +177,17 @@ class Moment:
             return Value(kind, symbol.space, symbol.address, moment, note="of unknown type")
 
         return value
+
+    def _placing(self, variable: Variable) -> Meaning:
+        """`placed` for this instruction: of most variables the place is all there is to it."""
+        places = self._places()
+        own = places is not None and variable.scope == places.name
+        shared = any(first <= variable.address < end for first, end in self.symbols.overlays)
+        if own or (shared and variable.space == "iram"):
+            return lambda moment: moment.placed(variable)
+        kind, space, address = variable.type, variable.space, variable.address
+        fields = self.symbols.variables.fields(variable)
+        return lambda moment: Value(kind, space, address, moment, fields=fields)
 
     def _unknown(self, name: str) -> NoValue:
         owners = {one.function for one in self.symbols.blocks.variables if one.name == name}

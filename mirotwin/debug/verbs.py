@@ -121,6 +121,7 @@ _BY_NAME = {name: verb for verb in VERBS for name in verb.names}
 _COMMAND = re.compile(r"(?:r\s+(?=[a-z]))?[A-Za-z?][A-Za-z-]*")
 _NOT_OF_A_RUN = ("set", "call", "jump", "return", "load", "kill")
 _BEGUN_PATH = re.compile(r"((?:\w+:)?\$?\w+(?:(?:\.|->)\w+|\[\w+\])*)(?:\.|->)(\w*)$")
+_BEGUN_STATIC = re.compile(r"\b([A-Za-z_]\w*):(\w*)$")
 _BEGUN_WORD = re.compile(r"[\w.]*$")
 
 
@@ -195,6 +196,13 @@ def _names(session: Session, line: str, kind: Completes) -> tuple[int, list[str]
         with suppress(BadInput):
             there = [name for name, _ in children(expression(path[1])(session.moment()))]
             return path.start(2), [name for name in there if name.startswith(path[2])]
+    if static := _BEGUN_STATIC.search(line):
+        there = sorted(
+            name
+            for name, variables in session.symbols.variables.by_name.items()
+            if any(static[1] in (one.module, one.scope) for one in variables)
+        )
+        return static.start(2), [name for name in there if name.startswith(static[2])]
     begun = _BEGUN_WORD.search(line)
     word = begun[0] if begun else ""
     names = set(session.symbols.known)
@@ -207,7 +215,7 @@ def _names(session: Session, line: str, kind: Completes) -> tuple[int, list[str]
 
 def _keys(given: str) -> list[str] | None:
     """Keys of a condition, or the values of one that has a few; None where no condition is named."""
-    name, *keys = given.split() + [""] * given.endswith(" ")
+    name, *keys = given.split() + [""] * given.endswith(" ") or [""]
     kind = CONDITIONS.get(name)
     if kind is None or not keys:
         return None

@@ -4,9 +4,10 @@ import pytest
 
 from miro_exact.bad_input import BadInput
 from miro_robot.image.debug_info import Sources
+from miro_robot.image.symbol_files import Symbol
 from mirotwin.debug.debugger import Debugger
 from mirotwin.debug.session import Session
-from mirotwin.debug.symbols import Symbols
+from mirotwin.debug.symbols import Moment, Symbols
 from mirotwin.debug.timeline import Timeline
 from mirotwin.debug.verbs import do
 from mirotwin.runs.inspected_run import InspectedRun
@@ -194,3 +195,23 @@ def test_a_stack_in_step_says_nothing_of_it():
         assert not any(
             "step" in line or "explained" in line for line in said(session, f"goto {time}", "where")
         )
+
+
+def test_what_a_name_means_at_an_instruction_is_worked_out_once(monkeypatch):
+    session, asked = Session(debugger_of(robot_run())), []
+    meaning = Moment._meaning
+    monkeypatch.setattr(Moment, "_meaning", lambda *given: asked.append(given[1]) or meaning(*given))
+    said(session, "break failsafe_tick if age == 20", "c")
+    assert session.moment().find("age", "failsafe").address
+    assert asked.count("age") == 2  # in the condition, and here with the file
+
+
+def test_a_data_breakpoint_on_what_only_the_map_names_keeps_the_name(monkeypatch):
+    session = session_of(LOOKS)
+    assert session.moment().scope_of("counter", "") is None
+    names = {"counter": Symbol(0x30, "iram"), "main": Symbol(0x10, "code")}
+    monkeypatch.setattr(session.symbols.image.symbols, "find", names.get)
+    assert session.moment().scope_of("counter", "") == ""
+    assert session.moment().scope_of("main", "") is None
+    said(session, "rwatch counter")
+    assert [pc for pc, _ in stops(session, 1)] == [BYTE_READ]
