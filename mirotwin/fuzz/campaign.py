@@ -45,7 +45,8 @@ class Campaign:
     """One campaign. `expected`: checks in Python that look at each input of the queue; `tell` gets each crash at once.
 
     `inputs`: those of the queue that were looked at; `judged`: those that the checks have looked at; `verdicts`: what
-    each of these came to; `reached_by`: the stream that reached what was to be reached. `show` is called now and then.
+    each of these came to; `reached_by`: the stream that reached what was to be reached. `until_crash`: the first crash
+    that is confirmed ends it. `show` is called now and then.
     """
 
     def __init__(
@@ -55,6 +56,7 @@ class Campaign:
         expected: Mapping[str, Any],
         covering: Covering | None,
         tell: Callable[[Crash], None],
+        until_crash: bool = False,
     ) -> None:
         self.engine = engine
         self.triage = triage
@@ -62,6 +64,7 @@ class Campaign:
         self.verdicts: dict[str, set[Verdict]] = {name: set() for name in expected}
         self.covering = covering
         self.tell = tell
+        self.until_crash = until_crash
         self.show: Callable[[Campaign], None] = lambda campaign: None
         self.judged = 0
         self.inputs = 0
@@ -89,14 +92,14 @@ class Campaign:
     # ---- the loop ------------------------------------------------------------------------------------------
 
     def run(self, time_s: float) -> None:
-        """Until the time is over, or what was to be reached is. The engine is stopped however it ends."""
+        """Until the time is over or it has what it was to find. The engine is stopped however it ends."""
         self._began_s = time.monotonic()
         try:
             self.engine.start()
-            while self.reached_by is None and self.run_s < time_s:
+            while not self.done and self.run_s < time_s:
                 began_s = time.monotonic()
                 self._collect()
-                self._work(min(began_s + SLICE_S, self._began_s + time_s))
+                self._work(min(time.monotonic() + SLICE_S, self._began_s + time_s))
                 self._show_sometimes()
                 time.sleep(max(0.0, LOOK_S - (time.monotonic() - began_s)))
         finally:
@@ -108,6 +111,15 @@ class Campaign:
         """Looks at what is left, so long at most; returns how many inputs were left out."""
         self._work(time.monotonic() + limit_s, at_ease=True)
         return len(self._crashes) + len(self._queue) + len(self._to_judge)
+
+    @property
+    def crashed(self) -> bool:
+        """Whether it has the crash that ends it."""
+        return self.until_crash and bool(self.triage.confirmed)
+
+    @property
+    def done(self) -> bool:
+        return self.crashed or self.reached_by is not None
 
     @property
     def run_s(self) -> float:
@@ -146,19 +158,19 @@ class Campaign:
             inputs.append(data)
 
     def _work(self, end_s: float, at_ease: bool = False) -> None:
-        """Crashes, and coverage between two of them; then checks in Python, a third of the time."""
-        while (self.reached_by is None or at_ease) and time.monotonic() < end_s:
+        """Crashes, and coverage between two of them; checks in Python get a third of the time."""
+        while (at_ease or not self.done) and time.monotonic() < end_s:
             if self._crashes and (not self._queue or self._looked >= LOOKED):
                 done = self._crashes
                 self._looked = 0
                 self._keep(self.triage.take(done[0]))
+            elif self._to_judge and (at_ease or 3 * self._judging_s <= self.run_s):
+                done = self._to_judge
+                self._judge(done[0])
             elif self._queue:
                 done = self._queue
                 self._looked += 1
                 self._look(done[0])
-            elif self._to_judge and (at_ease or 3 * self._judging_s <= self.run_s):
-                done = self._to_judge
-                self._judge(done[0])
             else:
                 return
             done.popleft()  # now: what is interrupted is looked at again

@@ -116,6 +116,7 @@ class FuzzOptions(Options, frozen=True, kw_only=True):
             metavar="SYMBOL|ADDRESS", help="Look for an input that reaches this function, and end with it."
         ),
     ] = None
+    until_crash: Annotated[bool, Option(help="End with the first failure that is confirmed.")] = False
     robots: Annotated[str, ROBOTS.saying("Slots of the network.", apart="bare")] = "3"
     slot: Annotated[int, SLOT.saying("Slot of the robot.", apart="bare")] = 0
     seed: Annotated[int | None, SEED.saying("Seed of the engine. Default: from the system.")] = None
@@ -323,7 +324,7 @@ def _campaign(
         failing, passing, silent = _sorted_out(target, inputs)
         engine = _engine(spec, passing, folder, options)
         tell = (lambda crash: None) if options.quiet else _tell
-        campaign = Campaign(engine, triage, expected, covering, tell)
+        campaign = Campaign(engine, triage, expected, covering, tell, options.until_crash)
         campaign.begin_with(failing, (*passing, *silent))
         return _run(campaign, options.time_s if passing else 0.0, options)
 
@@ -360,7 +361,7 @@ def _run(campaign: Campaign, time_s: float, options: FuzzOptions) -> int:
         campaign.show = progress.show
         try:
             campaign.run(time_s)
-            left = campaign.finish(AFTER_S)
+            left = 0 if campaign.crashed else campaign.finish(AFTER_S)
         except (KeyboardInterrupt, Terminated) as error:
             stopped, limit_s = error, 1.0
             if isinstance(error, KeyboardInterrupt):

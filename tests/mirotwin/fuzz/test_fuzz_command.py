@@ -29,7 +29,8 @@ main()
 @needs_sdcc
 def test_a_planted_mistake_is_found_and_the_printed_line_gives_it_again(mirotwin, engines, tmp_path):
     image = planted("takes frames with a bad CRC").path
-    code, out, err = mirotwin("fuzz", image, "--time", "3s", "--minimise", "0.3s", "--out", tmp_path / "out")
+    options = ("--time", "10min", "--until-crash", "--minimise", "0.3s")
+    code, out, err = mirotwin("fuzz", image, *options, "--out", tmp_path / "out")
     assert code == 1
     assert engines[0].stopped
     assert "mirotwin: found: " in err
