@@ -26,7 +26,7 @@ from mirotwin.firmware.code_place import address_of, check_code_at, place_of
 from mirotwin.runs.spec import RunSpec
 from mirotwin.shell.command import Option, Options, Word
 from mirotwin.shell.firmware_image import load_firmware
-from mirotwin.shell.options import BOARD, IMAGE, NAME, StackFrom, Whole
+from mirotwin.shell.options import BAUD, BOARD, IMAGE, NAME, StackFrom, Whole
 from mirotwin.shell.program import complain
 from mirotwin.shell.times import Time, TimeType
 from mirotwin.shell.verdicts import exit_code
@@ -50,12 +50,6 @@ CRYSTAL = Option(
     type=Whole(32_768, 100_000_000),
     metavar="HZ",
     help="Crystal frequency; a tick is one period, a machine cycle 12. Default 24000000; a board has its own.",
-)
-BAUD = Option(
-    "--baud",
-    type=Whole(50),
-    metavar="RATE",
-    help="Bit rate of --stdin. Default: that of the receiver. Needed by programs that measure the bit rate.",
 )
 
 
@@ -115,7 +109,12 @@ class BareOptions(Options, frozen=True, kw_only=True):
         bool,
         Option(help="Send each character of --stdin only when the program has taken the one before."),
     ] = False
-    baud: Annotated[int | None, BAUD] = None
+    baud: Annotated[
+        int | None,
+        BAUD.saying(
+            "Bit rate of --stdin. Default: that of the receiver. Needed by programs that measure the bit rate."
+        ),
+    ] = None
     pins: Annotated[
         str | None,
         Option(

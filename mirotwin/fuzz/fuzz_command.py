@@ -24,7 +24,7 @@ from miro_robot.image import FLASH_BYTES, SPACE_BYTES, Image
 from miro_robot.mcs51.opcodes import SFRS
 from miro_sim.scenario.board_scenario import BoardText, check_single, is_board, load_any
 from miro_sim.scenario.file import changed
-from mirotwin.firmware.bare_options import BAUD, CRYSTAL
+from mirotwin.firmware.bare_options import CRYSTAL
 from mirotwin.firmware.code_place import address_of
 from mirotwin.fuzz.board_target import BoardTarget
 from mirotwin.fuzz.campaign import AFTER_S, Campaign, Covering
@@ -45,7 +45,7 @@ from mirotwin.shell.command import Argument, Option, Options, command_of
 from mirotwin.shell.console import show
 from mirotwin.shell.debug_files import SourceFolders, source_folders
 from mirotwin.shell.firmware_image import image_for, load_firmware
-from mirotwin.shell.options import FIRMWARE, FORCE, JOBS, NAME, OUT, PATH, QUIET, SEED, SET, SLOT, Whole
+from mirotwin.shell.options import BAUD, FIRMWARE, FORCE, JOBS, NAME, OUT, PATH, QUIET, SEED, SET, SLOT, Whole
 from mirotwin.shell.options import Engine as EngineOption
 from mirotwin.shell.plugin_files import PART, PluginFiles
 from mirotwin.shell.processes import cores

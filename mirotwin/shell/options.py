@@ -119,6 +119,7 @@ JUNIT = Option("--junit", metavar="FILE.xml", type=PATH, help="Write JUnit XML, 
 ARTIFACTS = Option("--artifacts", metavar="DIR", type=PATH, help="Folder for what failures leave.")
 NETWORK = Option("--network", type=Whole(0, 0xFFFF), help="Number of the network.")
 SLOT = Option("--slot", type=Whole(0, 4), help="Slot of the robot.")
+BAUD = Option("--baud", type=Whole(50), metavar="RATE", help="Bit rate of the serial line.")
 JOBS = Option("--jobs", type=Whole(1, 256), help="Processes. Default: one for each core.")
 ALL = Option("--all", help="List everything, not only what comes first.")
 FROM = Option("--from", type=TimeType(), help="Begin there, such as 1.5s, 20ms or 48000t.")

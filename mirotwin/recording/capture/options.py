@@ -9,7 +9,7 @@ import click
 from miro_protocol.transmission import DOWN, UP
 from mirotwin.recording.capture.forms import FORMS
 from mirotwin.shell.command import Option, Options
-from mirotwin.shell.options import Whole
+from mirotwin.shell.options import BAUD
 
 DIRECTIONS = {"down": DOWN, "up": UP}
 
@@ -35,11 +35,7 @@ class CaptureOptions(Options, frozen=True, kw_only=True):
     ] = None
     baud: Annotated[
         int | None,
-        Option(
-            type=Whole(50, 10_000_000),
-            metavar="BAUD",
-            help="Of the sender. Default: fitted, else the line's 9600.",
-        ),
+        BAUD.saying("Bit rate of the sender. Default: fitted, else the line's 9600."),
     ] = None
     wires: Annotated[
         tuple[str, ...],
