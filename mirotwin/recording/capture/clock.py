@@ -12,9 +12,9 @@ _UNITS = {"s": 1, "sec": 1, "ms": 10**3, "us": 10**6, "µs": 10**6, "μs": 10**6
 TIME = (
     r"(?:(?:(?P<year>[0-9]{4})[-/.](?P<month>[0-9]{1,2})[-/.](?P<day>[0-9]{1,2})|[0-9]{1,2}[-/.][0-9]{1,2}[-/.][0-9]{2,4})"
     r"(?:T|[ ,_\t]{1,3}))?"
-    r"(?P<hour>[0-9]{1,2}):(?P<minute>[0-5][0-9]):(?P<second>[0-5][0-9])(?:[.,](?P<part>[0-9]{1,9}))?"
+    r"(?P<hour>[0-9]{1,2}):(?P<minute>[0-5][0-9]):(?P<second>[0-5][0-9])(?:[.,](?P<part>[0-9]{1,9}+)(?![0-9]))?+"
     r"(?:\s?(?P<noon>[AP]M)|Z|[+-][0-9]{2}:?[0-9]{2})?"
-    r"|(?P<number>[0-9]{1,20}(?:\.[0-9]{1,12})?)\s?(?P<unit>s|sec|ms|us|µs|μs|ns)?(?![0-9A-Za-z])"
+    r"|(?P<number>[0-9]{1,20}+(?:\.[0-9]{1,12}+)?+)\s?(?P<unit>s|sec|ms|us|µs|μs|ns)?(?![0-9A-Za-z])"
 )
 """A time of day, with or without a date, or a number of seconds or of another unit."""
 _TIME = re.compile(TIME, re.IGNORECASE)
@@ -22,6 +22,7 @@ _TIME = re.compile(TIME, re.IGNORECASE)
 
 class Clock:
     """Reads times. One of day that goes back by hours has passed midnight. `resolution_ticks`: of what was read.
+    `assumed`: the unit that was taken for a whole number without one.
 
     A number without a point and a unit is taken as Unix time if it has the digits of one, else as ms.
     """
@@ -29,6 +30,7 @@ class Clock:
     def __init__(self, unit: str = "") -> None:
         self.unit = unit
         self.resolution_ticks = TICKS_PER_SECOND
+        self.assumed = ""
         self._days = 0
         self._last = 0
 
@@ -39,15 +41,18 @@ class Clock:
         whole, _, part = match["number"].partition(".")
         unit = match["unit"] or self.unit
         if not unit:
-            unit = "s" if part else {10: "s", 13: "ms", 16: "us", 19: "ns"}.get(len(whole), "ms")
+            unit = "s"
+            if not part:
+                unit = self.assumed = {10: "s", 13: "ms", 16: "us", 19: "ns"}.get(len(whole), "ms")
         return self._scaled(int(whole + part), len(part), _UNITS[unit.lower()])
 
     def of_text(self, text: str) -> int:
         """Raises ValueError for what is no time."""
-        match = _TIME.fullmatch(text.strip())
+        text = text.strip()
+        match = _TIME.fullmatch(text.removeprefix("-"))
         if match is None:
             raise ValueError(f"{text[:20]!r} is no time")
-        return self.ticks(match)
+        return -self.ticks(match) if text.startswith("-") else self.ticks(match)
 
     def _scaled(self, number: int, places: int, per_second: int) -> int:
         scale: int = 10**places * per_second

@@ -7,6 +7,7 @@
 | at least four of the bytes that an MCAP file begins with | recording |
 | comments or none, then `TICK >`, `TICK <` or `TICK *`; or `# mirotwin stream` | stream |
 | a zip file with a sigrok session's parts | sigrok |
+| `<SALEAE>` | logic2 |
 | `$date`, `$version`, `$comment` or `$timescale` | vcd |
 | a line of names with a time and a value | saleae, table |
 | a line of names with a time, and levels 0 and 1 | edges |
@@ -62,10 +63,12 @@ def detect(head: bytes) -> Detected:
         return found
     if _STREAM.match(text_of(head, whole)):
         return Detected("stream", "its first line is one of ticks")
-    if found := _by_lines(head, whole):
+    if found := _by_lines(_lines(head, whole)):
         return found
     if HexText.begins(head, whole):
         return Detected("hex", "nothing but pairs of hex digits")
+    if found := _stamped(_lines(head, whole), loose=True):
+        return found
     if TERMINAL.match(head):
         return Detected("putty", "its first line is PuTTY's")
     if is_text(head, whole):
@@ -80,6 +83,8 @@ def _by_first_bytes(head: bytes) -> Detected | None:
         return Detected("pcap", "its first bytes are those of one")
     if len(head) >= _ENOUGH and (head.startswith(MCAP) or MCAP.startswith(head)):
         return Detected("recording", "its first bytes are those of one")
+    if head.startswith(b"<SALEAE>"):
+        return Detected("logic2", "its first bytes are those of one")
     if _VCD.match(head):
         return Detected("vcd", "its first word is of one")
     for magic, packer in _PACKED.items():
@@ -92,22 +97,27 @@ def _by_first_bytes(head: bytes) -> Detected | None:
     return None
 
 
-def _by_lines(head: bytes, whole: bool) -> Detected | None:
+def _lines(head: bytes, whole: bool) -> list[str]:
+    """The first lines that say something, without one that is cut."""
     text = text_of(head, whole)
     if "\0" in text[:_ENOUGH]:
-        return None
+        return []
     lines = re.split(r"\r\n|\n|\r", text)
-    lines = [line for line in (lines if whole or len(lines) == 1 else lines[:-1]) if line.strip()]
-    lines = lines[:_SAMPLE_LINES]
-    if not lines:
-        return None
+    lines = lines if whole or len(lines) == 1 else lines[:-1]
+    return [line for line in lines if line.strip()][:_SAMPLE_LINES]
+
+
+def _by_lines(lines: list[str]) -> Detected | None:
     if table := table_of(lines):
         return Detected(table.form, table.described)
-    most = len(lines) / 2
     if 2 * (count := dumps.fits_annotations(lines)) > len(lines):
         return Detected("annotations", f"{count} of the first {len(lines)} lines are of a UART decoder")
     if base := dumps.base_of(lines):
         return Detected(dumps.kind_of(lines), f"its offsets, to base {base}, agree with the bytes between")
-    if (count := hexlines.fits(lines)) > most:
+    return _stamped(lines)
+
+
+def _stamped(lines: list[str], loose: bool = False) -> Detected | None:
+    if 2 * (count := hexlines.fits(lines, loose)) > len(lines):
         return Detected("stamped", f"{count} of the first {len(lines)} lines are of times and hex digits")
     return None

@@ -50,24 +50,30 @@ def _row(line: str) -> _Row | None:
 
 def base_of(lines: Sequence[str]) -> int:
     """Base of the offsets with which they agree with the bytes between; 0 for no dump."""
-    rows = [row for line in lines if line.strip() not in ("", "*") and (row := _row(line))]
-    pairs = list(pairwise(rows))
+    rows: list[tuple[_Row, bool]] = []  # and whether repeated rows are left out before it
+    star = False
+    for line in lines:
+        row = _row(line)
+        if row is not None:
+            rows.append((row, star))
+        star = line.strip() == "*"
+    pairs = [(row, after, left_out) for (row, _), (after, left_out) in pairwise(rows)]
     for base in BASES:
-        good = sum(_follows(row, after, base) for row, after in pairs)
-        if pairs and good * 10 >= 9 * len(pairs) - 10 and good:
+        good = sum(_follows(row, after, base, left_out) for row, after, left_out in pairs)
+        if good and good * 10 >= 9 * len(pairs) - 10:
             return base
-    alone = len(rows) == 1 and rows[0].data and not rows[0].offset.strip("0") and len(rows[0].offset) > 4
+    row = rows[0][0] if len(rows) == 1 else None
+    alone = row is not None and row.data and not row.offset.strip("0") and len(row.offset) > 4
     return 16 if alone and any(mark in lines[0] for mark in (": ", "|", ">")) else 0
 
 
-def _follows(row: _Row, after: _Row, base: int) -> bool:
+def _follows(row: _Row, after: _Row, base: int, left_out: bool) -> bool:
     try:
         count = int(after.offset, base) - int(row.offset, base)
     except ValueError:
         return False
     size = len(row.data)
-    repeated = size > 0 and count > size and not count % size
-    return 0 < count <= size <= count + 1 or repeated
+    return (left_out and size > 0 and count > size) or 0 < count <= size <= count + 1
 
 
 def kind_of(lines: Sequence[str]) -> str:

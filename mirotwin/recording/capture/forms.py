@@ -89,6 +89,13 @@ def _value_changes(given: Input, facts: Facts) -> Iterator[Piece]:
     return characters_of(dump.changes(), dump.names, facts)
 
 
+def _transitions(given: Input, facts: Facts) -> Iterator[Piece]:
+    from mirotwin.recording.capture import logic
+
+    channel = logic.Transitions(given, facts)
+    return characters_of(channel.changes(), channel.names, facts)
+
+
 def _terminal(given: Input, facts: Facts) -> Iterator[Piece]:
     del facts
     if match := TERMINAL.match(given.peek()):
@@ -110,6 +117,7 @@ FORMS = {
         Form("edges", "digital edges, CSV", True, False, _table),
         Form("samples", "sigrok samples, CSV", True, False, _table),
         Form("sigrok", "sigrok session", True, False, _session),
+        Form("logic2", "Logic 2 binary file", True, False, _transitions),
         Form("vcd", "value change dump", True, False, _value_changes),
         Form("stamped", "time-stamped hex lines", True, True, _hex_lines),
         Form("annotations", "sigrok annotations", False, True, _annotations),

@@ -43,11 +43,16 @@ def frame_counts(sent: Iterable[Transmission]) -> dict[int, int]:
     return {count: decoder.valid for count, decoder in decoders.items()}
 
 
-def is_telemetry(head: Sequence[Transmission]) -> bool:
-    """Whether raw bytes read as robots' answers rather than as a host's frames."""
+def telemetry_count(sent: Iterable[Transmission]) -> int:
+    """Valid frames from robots."""
     from miro_protocol.decoder import TelemetryDecoder
 
     decoder = TelemetryDecoder()
-    for transmission in head:
+    for transmission in sent:
         decoder.hear(transmission)
-    return decoder.valid > max(frame_counts(head).values())
+    return decoder.valid
+
+
+def is_telemetry(head: Sequence[Transmission]) -> bool:
+    """Whether characters read as robots' answers rather than as a host's frames."""
+    return telemetry_count(head) > max(frame_counts(head).values())

@@ -21,46 +21,55 @@ _WORD = r"(?!(?:0x)?(?:[0-9A-Fa-f]{2})+\b)\w+"
 _CAN = r"\s*\w+\s+(?:[0-9A-Fa-f]{3,8}\#{1,2}|[0-9A-Fa-f]{3,8}\s+\[[0-9]+\]\s+)"
 _STAMPED = re.compile(
     rf"\s*(?P<before>(?:[<>]+|\[?[TR]XD?\]?:?)\s*)?[\[(\"]?(?:{TIME})[)\]\"]?(?P<words>{_CAN}|(?:[^\w\n]|{_WORD})*+)"
-    rf"(?P<data>{CHARACTERS})\s*+{_END}",
+    rf"(?<!=)(?P<data>{CHARACTERS})\s*+{_END}",
     re.IGNORECASE,
 )
 _HEAD = re.compile(
     rf"\s*(?P<before>(?:[<>]+|\[?[TR]XD?\]?:?)\s*)?[\[(\"]?(?:{TIME})(?P<words>[^\n]*)", re.IGNORECASE
 )
 _BARE = re.compile(rf"\s*(?P<data>{CHARACTERS})\s*+{_END}", re.IGNORECASE)
+_ROW = re.compile(r"(?P<data>(?:[0-9A-F]{2} ){16}).{16}")
+"""Of jpnevulator --ascii, whose text follows one blank."""
 _NOT_DIGITS = re.compile(r"0x|[^0-9A-Fa-f]", re.IGNORECASE)
 _DIVIDER = re.compile(r"\s*(?:[-=*#/;].*)?")
 
 
-def fits(lines: list[str]) -> int:
-    """How many of these lines are of this form: all with a time, of which the first has one that is plainly a time."""
-    stamped = [match for match in map(_STAMPED.match, lines) if match]
-    if not stamped:
-        heads = [line for line in lines if (match := _HEAD.match(line)) and match["hour"]]
-        bare = [line for line in lines if _BARE.match(line)]
-        return len(heads) + len(bare) if heads and bare else 0
-    plain = [match for match in stamped if _is_plain(match)]
-    return len(plain)
+def fits(lines: list[str], loose: bool = False) -> int:
+    """How many of these lines are of this form: with a time that is plainly one, or in a block below one.
+
+    `loose`: a whole number before a colon or the like is a time, too.
+    """
+    plain = sum(bool((match := _STAMPED.match(line)) and _is_plain(match, loose)) for line in lines)
+    if plain:
+        return plain
+    heads = sum(bool((match := _HEAD.match(line)) and match["hour"]) for line in lines)
+    return heads and heads + sum(bool(_in_block(line)) for line in lines)
 
 
-def _is_plain(match: re.Match[str]) -> bool:
+def _in_block(line: str) -> re.Match[str] | None:
+    return _ROW.fullmatch(line) or _BARE.match(line)
+
+
+def _is_plain(match: re.Match[str], loose: bool = False) -> bool:
     """Whether the time cannot be taken for characters or for an offset."""
-    number = match["number"]
-    return (
-        number is None
-        or "." in number
-        or bool(match["unit"] or direction_in(match["words"]) or match["before"])
-    )
+    number, words = match["number"], match["words"]
+    if number is None or "." in number or match["unit"] or match["before"]:
+        return True
+    return bool(direction_in(words)) or (loose and words.lstrip()[:1] in (":", ";", ",", "|", "]", ")"))
 
 
 def read(lines: Iterator[str], facts: Facts) -> Iterator[Piece]:
     """A piece a line."""
     clock = Clock()
     direction, tick = "", None
-    in_block = False
+    in_block = told = False
     for number, line in enumerate(lines, 1):
         match = _STAMPED.match(line)
-        if match is None and in_block and (bare := _BARE.match(line)):
+        if (
+            in_block
+            and not (match and _is_plain(match))
+            and (bare := _ROW.fullmatch(line) or _BARE.match(line))
+        ):
             yield Piece(tick, direction, characters(bare["data"]))
             tick = None
             continue
@@ -75,6 +84,9 @@ def read(lines: Iterator[str], facts: Facts) -> Iterator[Piece]:
             facts.pass_over("line", f"line {number}")
             continue
         facts.resolution_ticks = clock.resolution_ticks
+        if clock.assumed and not told:
+            told = True
+            facts.tell(f"{facts.label}: times without a unit are taken as {clock.assumed}")
         direction = direction_in(f"{match['before'] or ''} {match['words']}")
         data = match.groupdict().get("data")
         in_block = data is None

@@ -14,6 +14,8 @@ from statistics import median
 
 from miro_exact.bad_input import BadInput
 from miro_exact.clock import TICKS_PER_SECOND
+from miro_exact.inputs import InputError
+from miro_protocol.stream_line import MAX_TICK
 from miro_protocol.table import BITS_PER_CHARACTER, SPACING_TICKS, SPACING_TOLERANCE_TICKS
 from miro_protocol.transmission import Transmission, character_ticks
 from mirotwin.recording.capture.pieces import Facts, Piece, peeked
@@ -64,6 +66,7 @@ class Joiner:
         self._done: list[tuple[int, int, Transmission]] = []
         self._count = 0
         self._late_ticks = 0
+        self._usual = True
 
     def transmissions(self) -> Iterator[Transmission]:
         """In the order of time. What cannot be read raises after all before it was given."""
@@ -78,7 +81,7 @@ class Joiner:
             self._push(one.closed())
         self._open = {}
         yield from self._ready()
-        if self._late_ticks > _TOLD_TICKS + self.facts.resolution_ticks:
+        if self._usual and self._late_ticks > _TOLD_TICKS + self.facts.resolution_ticks:
             late_ms = self._late_ticks * 1000 / TICKS_PER_SECOND
             reason = f"characters come faster than the line takes them: up to {late_ms:.0f} ms late"
             self.facts.tell(f"{self.facts.label}: {reason}")
@@ -94,7 +97,8 @@ class Joiner:
             BITS_PER_CHARACTER * TICKS_PER_SECOND // facts.baud if facts.baud else fitted_spacing(head)
         )
         baud = BITS_PER_CHARACTER * TICKS_PER_SECOND / (facts.spacing_ticks or SPACING_TICKS)
-        if abs(baud / _USUAL_BAUD - 1) >= 0.05:
+        self._usual = abs(baud / _USUAL_BAUD - 1) < 0.05
+        if not self._usual:
             sent = (
                 f"a sender at {standard_baud(baud) or round(baud)} baud, the robots' line has {_USUAL_BAUD}"
             )
@@ -107,6 +111,10 @@ class Joiner:
             facts.tell(f"{facts.label}: {moved_by(facts.offset_s)}")
         offset = facts.offset_s * TICKS_PER_SECOND
         for piece in pieces:
+            if piece.tick is not None and abs(piece.tick - offset) > MAX_TICK:
+                raise InputError(
+                    facts.label, f"a time of {piece.tick / TICKS_PER_SECOND:g} s", "is it damaged?"
+                )
             yield (
                 piece._replace(tick=max(0, piece.tick - offset))
                 if offset and piece.tick is not None

@@ -1,9 +1,11 @@
-"""Levels from sigrok sessions (`.sr`) and from value change dumps (VCD)."""
+"""Levels from sigrok sessions (`.sr`), value change dumps (VCD) and Saleae's binary files."""
 
 from __future__ import annotations
 
 import configparser
+import math
 import re
+import struct
 import zipfile
 import zlib
 from collections.abc import Iterator
@@ -14,11 +16,14 @@ from vcd.reader import TokenKind, VCDParseError, tokenize
 
 from miro_exact.clock import TICKS_PER_SECOND
 from miro_exact.inputs import InputError
+from mirotwin.recording.capture.input import Input
 from mirotwin.recording.capture.pieces import Facts
 from mirotwin.recording.capture.serial_line import Change
 
 PIECE_BYTES = 1 << 20
 METADATA_BYTES = 1 << 16
+MOST_S = 1e11
+SALEAE = b"<SALEAE>"
 DEFINITIONS = 1 << 14
 """Signals of a VCD file."""
 _RATE = re.compile(r"([0-9]+(?:\.[0-9]+)?)\s*([kmg]?)(?:hz)?", re.IGNORECASE)
@@ -161,3 +166,42 @@ class Dump:
                 tick = data * TICKS_PER_SECOND // self._units
             elif kind is TokenKind.CHANGE_SCALAR and data.id_code in self._lines and data.value in "01":
                 yield Change(tick, self._lines[data.id_code], int(data.value))
+
+
+class Transitions:
+    """A binary file of Logic 2, version 0 or 1: one digital channel. Raises InputError."""
+
+    def __init__(self, given: Input, facts: Facts) -> None:
+        self.given = given
+        self.names = ["the channel"]
+        magic, version, kind = struct.unpack("<8sii", self._taken(16))
+        if magic != SALEAE or version not in (0, 1):
+            raise InputError(given.label, f"is no binary file of version 0 or 1 ({version})", "export CSV")
+        if kind:
+            raise InputError(given.label, "holds an analog channel", "export the digital one")
+        self.parts = struct.unpack("<Q", self._taken(8))[0] if version else 1
+        self.head = "<IdddQ" if version else "<IddQ"
+
+    def changes(self) -> Iterator[Change]:
+        """The changes of all parts of the file."""
+        for _ in range(self.parts):
+            level, *_, begin_s, _, count = struct.unpack(self.head, self._taken(struct.calcsize(self.head)))
+            yield Change(self._tick(begin_s), 0, int(level != 0))
+            level = int(level != 0)
+            while count:
+                some = min(count, PIECE_BYTES // 8)
+                for (time_s,) in struct.iter_unpack("<d", self._taken(8 * some)):
+                    level ^= 1
+                    yield Change(self._tick(time_s), 0, level)
+                count -= some
+
+    def _tick(self, time_s: float) -> int:
+        if not math.isfinite(time_s) or abs(time_s) > MOST_S:
+            raise InputError(self.given.label, f"a time of {time_s} s", "export it again")
+        return round(time_s * TICKS_PER_SECOND)
+
+    def _taken(self, size: int) -> bytes:
+        data = self.given.read(size)
+        if len(data) < size:
+            raise InputError(self.given.label, "the file ends in the middle of a channel", "export it again")
+        return data

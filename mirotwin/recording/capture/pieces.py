@@ -62,8 +62,8 @@ class Facts:
 
 
 _DIRECTION = re.compile(
-    r"(?P<up><+-*|←|收|(?<![A-Za-z])(?:rxd?|in|input|recv|received?|read|incoming|rcvd)(?![A-Za-z]))"
-    r"|(?P<down>(?<!-)>+|发|(?<![A-Za-z])(?:txd?|out|output|send|sent|write|written|outgoing|xmit)(?![A-Za-z]))",
+    r"(?P<up><+-*|←|收|(?<![A-Za-z])(?:rxd?|in|input|recv|receiv(?:ed?|ing)|read|incoming|rcvd)(?![A-Za-z]))"
+    r"|(?P<down>(?<!-)>+|发|(?<![A-Za-z])(?:txd?|out|output|send(?:ing)?|sent|write|written|outgoing|xmit)(?![A-Za-z]))",
     re.IGNORECASE,
 )
 

@@ -101,7 +101,7 @@ def _wires(head: Sequence[Change], names: Sequence[str], facts: Facts) -> dict[i
         bit_ticks = TICKS_PER_SECOND / facts.baud if facts.baud else fitted_bit(pulses[1:] or pulses)
         if not bit_ticks or len(own) < 2:
             continue
-        wires[line] = _Wire(line, bit_ticks, _idle(own))
+        wires[line] = _Wire(line, bit_ticks, _idle(own, bit_ticks))
         name = names[line]
         if not wires[line].idle:
             facts.tell(f"{facts.label}: {name} is low when idle: read as inverted")
@@ -117,13 +117,10 @@ def _wires(head: Sequence[Change], names: Sequence[str], facts: Facts) -> dict[i
     return wires
 
 
-def _idle(own: Sequence[Change]) -> int:
-    """The level of the longest pulse: a character has at most nine bits without an edge."""
-    longest = max(pairwise(own), key=lambda pair: pair[1].tick - pair[0].tick)
-    pulses = [after.tick - change.tick for change, after in pairwise(own)]
-    if max(pulses) > 9 * fitted_bit(pulses):
-        return longest[0].level
-    return 1
+def _idle(own: Sequence[Change], bit_ticks: float) -> int:
+    """The level of the longest pulse, if it is longer than any in a character; else the usual one."""
+    length, level = max((after.tick - change.tick, change.level) for change, after in pairwise(own))
+    return level if length > _FRAME_BITS * bit_ticks else 1
 
 
 def fitted_bit(pulses: Sequence[int]) -> float:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import re
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Sequence
 
 import msgspec
 
@@ -13,11 +13,11 @@ from miro_protocol import stream
 from miro_protocol.pcapng_reader import CaptureError
 from miro_protocol.stream import StreamError
 from miro_protocol.stream_header import Header
-from miro_protocol.transmission import UP, Transmission, character_ticks
+from miro_protocol.transmission import DOWN, UP, Transmission, character_ticks
 from mirotwin.recording.capture import recorded
 from mirotwin.recording.capture.detect import detect
 from mirotwin.recording.capture.forms import FORMS, Form
-from mirotwin.recording.capture.heads import head_of, is_telemetry
+from mirotwin.recording.capture.heads import frame_counts, head_of, is_telemetry, telemetry_count
 from mirotwin.recording.capture.hextext import HexError, HexText
 from mirotwin.recording.capture.input import Input
 from mirotwin.recording.capture.join import Joiner, moved_by
@@ -52,7 +52,7 @@ class Source(msgspec.Struct):
     def notes(self) -> list[str]:
         """What a file that is made of it should say, once its first transmission was read."""
         offset = self.facts.offset_s
-        return [f"of a {self.form.title}; {moved_by(offset)}"] if offset else []
+        return [f"from {self.form.title}: {moved_by(offset)}"] if offset else []
 
 
 def form_of(given: Input, options: CaptureOptions, tell: Callable[[str], None]) -> Form:
@@ -90,7 +90,7 @@ def open_capture(
         sent = Joiner(form.read(given, facts), facts).transmissions()
     else:
         sent = _contiguous(_raw(given) if form.name == "raw" else _hex(given))
-    return Source(given.label, form, _directed(sent, form, options.direction), robots, facts)
+    return Source(given.label, form, _directed(sent, form, options.direction, facts), robots, facts)
 
 
 def timed_capture(
@@ -107,10 +107,13 @@ def timed_capture(
     return source
 
 
-def _directed(sent: Iterator[Transmission], form: Form, requested: str | None) -> Iterator[Transmission]:
+def _directed(
+    sent: Iterator[Transmission], form: Form, requested: str | None, facts: Facts
+) -> Iterator[Transmission]:
     """With directions and networks instead of wires, as the beginning looks.
 
-    A wire that does not say who sends carries what its beginning decodes as. Wires of both directions are one network.
+    A wire that does not say who sends carries what its beginning decodes as. What was captured at the robot says TX of
+    what the robot sends: it is turned round. Wires of both directions are one network.
     """
     head: list[Transmission]
     first, sent = peeked(sent, 1)
@@ -118,6 +121,10 @@ def _directed(sent: Iterator[Transmission], form: Form, requested: str | None) -
         head, everything = [], sent  # a pipe need not wait for a beginning
     else:
         head, everything = head_of(sent)
+    if _is_turned(head):
+        facts.tell(f"{facts.label}: was captured at the robot: what it calls sent is from the robot")
+        head = [_turned(one) for one in head]
+        everything = map(_turned, everything)
     places: dict[int, tuple[str, int]] = {}
     taken = dict.fromkeys(DIRECTIONS.values(), 0)
     for wire in sorted({one.network for one in head}):
@@ -139,6 +146,18 @@ def _directed(sent: Iterator[Transmission], form: Form, requested: str | None) -
             tick = tick // character_ticks("") * character_ticks(direction)
         direction = one.direction or direction
         yield msgspec.structs.replace(one, tick=tick, direction=direction, network=network)
+
+
+def _is_turned(head: Sequence[Transmission]) -> bool:
+    """Whether frames are in these only if directions are the other way round."""
+    down, up = ([one for one in head if one.direction == way] for way in (DOWN, UP))
+    if any(frame_counts(down).values()) or telemetry_count(up):
+        return False
+    return any(frame_counts(up).values()) or bool(telemetry_count(down))
+
+
+def _turned(one: Transmission) -> Transmission:
+    return msgspec.structs.replace(one, direction={DOWN: UP, UP: DOWN}.get(one.direction, one.direction))
 
 
 def _raw(given: Input) -> Iterator[bytes]:

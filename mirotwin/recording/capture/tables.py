@@ -23,16 +23,16 @@ from mirotwin.recording.capture.serial_line import Change
 
 HEAD_LINES = 200
 _TIME = re.compile(
-    r"(?:start[ _]?)?(?:time(?:stamp)?|时间|zeit)(?:\s*[\[(]?(?P<unit>s|ms|us|µs|ns)[\])]?)?", re.I
+    r"(?:start[ _]?)?(?:time(?:stamp)?|时间|zeit)(?:[ _]?[\[(]?(?P<unit>s|ms|us|µs|ns)[\])]?)?", re.I
 )
-_VALUE = re.compile(r"value|data|bytes?|hex|char(?:acter)?s?|数据|daten|payload", re.I)
+_VALUE = re.compile(r"value|data(?:_hex)?|bytes?|hex|char(?:acter)?s?|数据|daten|payload", re.I)
 _DIRECTION = re.compile(r"dir(?:ection)?|rx ?/ ?tx|tx ?/ ?rx|方向", re.I)
 _SOURCE = re.compile(r"name|channel|analy[sz]er|port|source", re.I)
 _BAD_STOP = re.compile(r"framing error|error", re.I)
 _SALEAE = re.compile(r"Time ?\[s\],(?:Packet ID,)?Value\b|name,type,start_time,", re.I)
 _RATE = re.compile(r";.*samplerate:\s*([0-9.]+)\s*([kMG]?)Hz", re.I)
 _PREFIXES = {"": 1, "k": 10**3, "m": 10**6, "g": 10**9}
-_LEVEL = re.compile(r"[01](?:\.0*)?")
+_LEVEL = re.compile(r"[01](?:\.0*)?|X", re.I)
 _HEX = re.compile(rf"\s*(?:'.*'\s*\()?(?P<data>{CHARACTERS})\)?\s*")
 _BINARY = re.compile(r"\s*0b((?:[01] ?){1,8})\s*")
 
@@ -213,7 +213,7 @@ def _value(text: str, decimal: bool) -> bytes:
 def read_levels(lines: Iterator[str], facts: Facts, table: Table) -> Iterator[Change]:
     """How the wires change, in the order of the rows."""
     clock = Clock(table.unit)
-    last: list[int] = [-1] * len(table.levels)
+    last = [""] * len(table.levels)
     sample = -1
     for number, line in enumerate(lines, 1):
         if number <= table.start or not line.strip() or line.startswith(";"):
@@ -221,7 +221,7 @@ def read_levels(lines: Iterator[str], facts: Facts, table: Table) -> Iterator[Ch
         sample += 1
         row = fields_of(line, table.delimiter)
         try:
-            levels = [row[column].strip()[0] == "1" for column in table.levels]
+            levels = [row[column].strip()[0] for column in table.levels]
             tick = (
                 round(sample * TICKS_PER_SECOND / table.rate_hz)
                 if table.rate_hz
@@ -230,9 +230,9 @@ def read_levels(lines: Iterator[str], facts: Facts, table: Table) -> Iterator[Ch
         except (ValueError, IndexError):
             facts.pass_over("row", f"line {number}")
             continue
-        for line_number, level in enumerate(levels):
-            if level != last[line_number]:
-                last[line_number] = level
-                yield Change(tick, line_number, level)
+        for wire, level in enumerate(levels):
+            if level != last[wire] and level in "01":  # X: not known there
+                last[wire] = level
+                yield Change(tick, wire, int(level))
     if sample < 0:
         raise InputError(facts.label, "holds no row", "export the table again")

@@ -201,6 +201,74 @@ def annotations(sent):
     return lines(f"uart-1: {byte:02X}" for _, byte, _ in characters(sent))
 
 
+def block(head, row, end=""):
+    """Lines of 16 characters under a head with time and direction."""
+
+    def write(sent):
+        texts = []
+        for one in sent:
+            second, micros = divmod(one.tick // 24, 10**6)
+            clock = f"{12 + second // 3600:02}:{second // 60 % 60:02}:{second % 60:02}.{micros:06}"
+            texts.append(head(clock, one))
+            texts += [row(one.data[place : place + 16]) for place in range(0, len(one.data), 16)]
+            texts += [end] if end else []
+        return lines(texts)
+
+    return write
+
+
+socat = block(
+    lambda clock, one: (
+        f"{one.direction} 2024/11/28 {clock}  length={len(one.data)} from=0 to={len(one.data) - 1}"
+    ),
+    lambda data: f" {data.hex(' '):48} {shown(data)}",
+    "--",
+)
+jpnevulator = block(
+    lambda clock, one: f"2024-11-28 {clock}: {'SENDING' if one.direction == '>' else 'RECEIVING'}",
+    lambda data: f"{data.hex(' ').upper():47} {shown(data)}",
+)
+
+
+def sscom(sent):
+    texts = []
+    for one in sent:
+        ms = one.tick // 24_000
+        clock = f"23:59:{58 + ms // 1000:02}" if ms < 2000 else f"00:00:{ms // 1000 - 2:02}"
+        way = "发→◇" if one.direction == ">" else "收←◆"
+        texts.append(f"[{clock}.{ms % 1000:03}]{way}{one.data.hex(' ').upper()} ")
+    return "\r\n".join(texts).encode("gb18030")
+
+
+def candump(sent):
+    """Eight characters a frame, each with the time of its first."""
+    texts = []
+    for one in sent:
+        for place in range(0, len(one.data), 8):
+            time_s = (one.tick + place * SPACING) / SECOND + UNIX_S
+            texts.append(f"({time_s:.6f}) can0 123#{one.data[place : place + 8].hex().upper()}")
+    return lines(texts)
+
+
+def logic2(version):
+    """One channel; version 1 in two parts."""
+
+    def write(sent):
+        changes = edges(sent)
+        half = len(changes) // 2
+        parts = [changes[:half], changes[half - 1 :]] if version and half > 1 else [changes]
+        made = struct.pack("<8sii", b"<SALEAE>", version, 0)
+        made += struct.pack("<Q", len(parts)) if version else b""
+        for part in parts:
+            rate = (1e6,) if version else ()
+            head = [part[0][1], *rate, part[0][0] / SECOND, part[-1][0] / SECOND, len(part) - 1]
+            made += struct.pack("<IdddQ" if version else "<IddQ", *head)
+            made += b"".join(struct.pack("<d", tick / SECOND) for tick, _ in part[1:])
+        return made
+
+    return write
+
+
 MICROSECOND, SAMPLE = 1e-6, 4e-6
 FORMS = {
     "byte_each_us.pcapng": Form(byte_each, "pcapng", MICROSECOND, True),
@@ -220,5 +288,11 @@ FORMS = {
     "saleae_digital.csv": Form(digital, "edges", 1e-8),
     "line.sr": Form(session, "sigrok", SAMPLE),
     "line.vcd": Form(vcd, "vcd", 1e-7),
+    "socat.log": Form(socat, "stamped", MICROSECOND, True),
+    "jpnevulator.log": Form(jpnevulator, "stamped", MICROSECOND, True),
+    "sscom.txt": Form(sscom, "stamped", 1e-3, True),
+    "candump-L.log": Form(candump, "stamped", MICROSECOND),
+    "digital_0.bin": Form(logic2(0), "logic2", 1e-7),
+    "digital_1.bin": Form(logic2(1), "logic2", 1e-7),
     "sigrok.csv": Form(sigrok_csv, "samples", SAMPLE),
 }  # fmt: skip
