@@ -40,7 +40,7 @@ def fits(lines: list[str], loose: bool = False) -> int:
     `loose`: a whole number before a colon or the like is a time, too.
     """
     plain = sum(bool((match := _STAMPED.match(line)) and _is_plain(match, loose)) for line in lines)
-    if plain:
+    if plain > loose:  # one such line may be anything
         return plain
     heads = sum(bool((match := _HEAD.match(line)) and match["hour"]) for line in lines)
     return heads and heads + sum(bool(_in_block(line)) for line in lines)

@@ -26,6 +26,7 @@ from tests.mirotwin.recording.capture.captured import (
     SPACING,
     characters,
     edges,
+    hexdump,
     lines,
 )
 
@@ -89,7 +90,7 @@ def sessions(draw, both):
 
 
 @pytest.mark.parametrize("name", FORMS)
-@settings(max_examples=30)
+@settings(max_examples=10)
 @given(data=st.data())
 def test_what_is_written_in_any_form_is_read_back(name, data):
     form = FORMS[name]
@@ -107,7 +108,7 @@ def test_what_is_written_in_any_form_is_read_back(name, data):
 
 
 @pytest.mark.parametrize("name", FORMS)
-@settings(max_examples=40)
+@settings(max_examples=15)
 @given(data=st.data())
 def test_a_damaged_capture_gives_transmissions_and_at_most_one_error(name, data):
     whole = FORMS[name].write(SESSION[:3])
@@ -252,7 +253,12 @@ def test_the_form_can_be_forced(mirotwin, capture, form):
 
 
 @pytest.mark.parametrize(
-    "words", [["replay"], ["replay", "--firmware", "mine.ihx"], ["report", "--out", "page.html"]]
+    "words",
+    [
+        ["replay"],
+        ["replay", "--firmware", "mine.ihx"],
+        pytest.param(["report", "--out", "page.html"], marks=pytest.mark.slow),
+    ],
 )
 def test_all_commands_read_captures(mirotwin, capture, words, tmp_path, monkeypatch):
     monkeypatch.chdir(tmp_path)
