@@ -84,8 +84,13 @@ class PortScript(TrialScript):
         return frame
 
 
-def try_at_port(rules: Sequence[Rule], desk: DeskOptions, note: Note) -> Iterator[Outcome]:
-    """Outcomes, each as soon as it is known. `note` gets notes. Raises BadInput where no robot answers, PortError."""
+def try_at_port(
+    rules: Sequence[Rule], desk: DeskOptions, note: Note, everything: bool = False
+) -> Iterator[Outcome]:
+    """Outcomes, each as soon as it is known. `note` gets notes; `everything`: as of `in_order`.
+
+    Raises BadInput where no robot answers, PortError.
+    """
     with RobotPort(desk, trial_of(rules[0]).scenario, note=note) as port:
         topology = Topology(port.greet(ROBOT_COUNTS), port.slots[:1])
         if len(port.slots) > 1:
@@ -97,7 +102,7 @@ def try_at_port(rules: Sequence[Rule], desk: DeskOptions, note: Note) -> Iterato
                 return Outcome(rule.id, (), unseen=NOT_OBSERVABLE[rule.id])
             return _try_often(rule, port, topology)
 
-        yield from in_order(rules, tried)
+        yield from in_order(rules, tried, everything)
 
 
 def _try_often(rule: Rule, port: RobotPort, topology: Topology) -> Outcome:

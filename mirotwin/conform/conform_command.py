@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Collection, Mapping, Sequence
 from pathlib import Path
 from typing import Annotated
 
@@ -11,6 +11,7 @@ import msgspec
 
 from miro_exact.bad_input import BadInput, amount
 from miro_robot.image import Image
+from mirotwin.conform import baseline
 from mirotwin.conform.explain import explain
 from mirotwin.conform.rule import Rule
 from mirotwin.conform.rules import ALL as EVERY_RULE
@@ -22,7 +23,7 @@ from mirotwin.shell.console import plain_table, show
 from mirotwin.shell.firmware_image import load_firmware
 from mirotwin.shell.json_text import json_bytes
 from mirotwin.shell.junit import TestCase, junit_xml
-from mirotwin.shell.options import ALL, ARTIFACTS, JSON, JUNIT, NAME, QUIET, SEED, Engine, StackFrom
+from mirotwin.shell.options import ALL, ARTIFACTS, JSON, JUNIT, NAME, PATH, QUIET, SEED, Engine, StackFrom
 from mirotwin.shell.outputs import check_file, whole_file
 from mirotwin.shell.program import complain, show_line
 from mirotwin.shell.progress import ProgressBar
@@ -39,7 +40,7 @@ from mirotwin.verify.cases.case import write_case
 
 LINES = 5
 """Firmware faults that are listed."""
-_OF_TRIALS = ("image", "everything", "junit", "artifacts", "seed", "stack_from", "port")
+_OF_TRIALS = ("image", "everything", "junit", "artifacts", "baseline", "seed", "stack_from", "port")
 """Options that have no effect on a list of the rules."""
 
 
@@ -52,9 +53,21 @@ class ConformOptions(Options, frozen=True, kw_only=True):
     ] = ()
     long: Annotated[bool, Option(help="Also try the rules that take minutes of virtual time.")] = False
     listing: Annotated[bool, Option("--list", help="List the rules and try none.", apart="explain")] = False
-    everything: Annotated[bool, ALL.saying("Of rules that are not judged, a line each.", apart="explain")] = (
-        False
-    )
+    everything: Annotated[
+        bool, ALL.saying("Also try rules of which a presupposition failed.", apart="explain")
+    ] = False
+    baseline: Annotated[
+        Path | None,
+        Option(
+            metavar="FILE.toml",
+            type=PATH,
+            help="Rules that are known to fail: they are listed, and only others count.",
+            apart="explain",
+        ),
+    ] = None
+    write_baseline: Annotated[
+        bool, Option(help="Write the rules that fail now into the file of --baseline.", needs="baseline")
+    ] = False
     explain: Annotated[
         str | None,
         Option(metavar="ID", help="Show what happened in the trial of one rule, and try no other."),
@@ -127,6 +140,8 @@ def conform(options: ConformOptions) -> int:
     observable, one that needs times which the PC cannot keep, or motion that is not allowed, is not judged; neither is
     passed.
 
+    With --baseline a rule that is in FILE may fail. One that passes again is reported; --write-baseline takes it out.
+
     Exit code 1: a rule failed, or one of --rule was not judged; 3: the firmware did what it must not (bus, stack, ..)
     in one of the trials; 5: no rule was judged.
     """
@@ -143,6 +158,10 @@ def conform(options: ConformOptions) -> int:
         return DONE
     if junit is not None:
         check_file(junit, "--junit", options.image)
+    known: dict[str, str] = {}
+    if options.baseline is not None:
+        check_file(options.baseline, "--baseline", options.image)
+        known = baseline.read(options.baseline, options.write_baseline)
     at_port = options.desk.port
     if at_port:
         if given := options.given("image", "explain", "artifacts", "stack_from", "seed"):
@@ -150,7 +169,7 @@ def conform(options: ConformOptions) -> int:
         from mirotwin.conform.by_answers import try_at_port  # loads pyserial
 
         properties = {"port": at_port}
-        tried = try_at_port(rules, options.desk, complain)
+        tried = try_at_port(rules, options.desk, complain, options.everything)
     else:
         firmware = load_firmware(options.image, named=False, stack_from=options.stack_from)
         if options.explain is not None:
@@ -159,7 +178,7 @@ def conform(options: ConformOptions) -> int:
             _make_room(artifacts, rules)
         sha256, seed = firmware.sha256, f"{options.seed}"
         properties = {"firmware": firmware.path.name, "firmware_sha256": sha256, "seed": seed}
-        tried = try_all(rules, firmware, options.seed, keep=artifacts is not None, ahead=True)
+        tried = try_all(rules, firmware, options.seed, artifacts is not None, True, options.everything)
     outcomes: list[Outcome] = []
     lost: BadInput | None = None
     unwritten = ""
@@ -173,23 +192,38 @@ def conform(options: ConformOptions) -> int:
         except BadInput as error:  # a robot that was lost: outcomes before that are reported
             lost = error
     outcomes = with_faults(outcomes, rules)
+    cured = [one.rule for one in outcomes if one.rule in known and one.verdict == "passed"]
+    if options.baseline is not None and options.write_baseline and lost is None:
+        known = baseline.write(options.baseline, known, outcomes)
     if outcomes or lost is None:
-        _report(outcomes, rules, options)
+        _report(outcomes, rules, options, known)
+    if cured and not options.write_baseline:
+        remedy = (
+            f"take {'it' if len(cured) == 1 else 'them'} out of {options.baseline}, or give --write-baseline"
+        )
+        complain(f"{', '.join(cured)}: known to fail, but passed; {remedy}")
     if unwritten:
         complain(unwritten)
     _report_faults(outcomes)
     if options.junit is not None and (outcomes or lost is None):  # reported first: the file may fail
-        cases = [_test_case(one, bool(options.ids)) for one in outcomes]
+        cases = [_test_case(one, bool(options.ids), known) for one in outcomes]
         with whole_file(options.junit, "--junit") as part:
             part.write_bytes(junit_xml("mirotwin conform", cases, properties))
     if lost is not None:
         raise lost
-    faults = ["fault" for one in outcomes if one.faults]
-    return exit_code(*faults, *(_counting(one, bool(options.ids)) for one in outcomes))
+    forbidden = {kind for id in known for kind in find(id).faults}
+    faults = [
+        "fault" for one in outcomes for _, _, fault in one.faults if fault.kind not in forbidden
+    ]  # whose rule is known to fail
+    return exit_code(*faults, *(_counting(one, bool(options.ids), known) for one in outcomes))
 
 
-def _counting(outcome: Outcome, named: bool) -> Verdict:
-    """The verdict that counts for the exit code: that a rule is not judged does only where somebody has named it."""
+def _counting(outcome: Outcome, named: bool, known: Collection[str]) -> Verdict:
+    """The verdict that counts for the exit code. That a rule is not judged does only where somebody has named it, and
+    that one of `known` fails, or one that presupposes it is not judged, does not.
+    """
+    if outcome.rule in known or outcome.cause in known:
+        return "passed"
     return "not observable" if outcome.verdict == "not judged" and not named else outcome.verdict
 
 
@@ -204,11 +238,13 @@ def _keep(outcome: Outcome, artifacts: Path, firmware: Image) -> str:
     return ""
 
 
-def _report(outcomes: Sequence[Outcome], rules: Sequence[Rule], options: ConformOptions) -> None:
+def _report(
+    outcomes: Sequence[Outcome], rules: Sequence[Rule], options: ConformOptions, known: Mapping[str, str]
+) -> None:
     if options.as_json:
-        _print_json(outcomes)
+        _print_json(outcomes, known)
         return
-    _print_table(outcomes, rules, options.quiet, options.everything)
+    _print_table(outcomes, rules, options.quiet, options.everything, known)
     if options.artifacts is not None and not options.quiet:
         _print_replays(outcomes, options.artifacts)
 
@@ -246,22 +282,25 @@ def _list(rules: Sequence[Rule], as_json: bool) -> None:
     show(table)
 
 
-def _test_case(outcome: Outcome, named: bool) -> TestCase:
+def _test_case(outcome: Outcome, named: bool, known: Mapping[str, str]) -> TestCase:
     """Without a time: the same image gives the same bytes. `named`: the user named this rule."""
     rule = find(outcome.rule)
     case = TestCase(f"{rule.id} {rule.name}", f"conform.{chapter_of(rule).title}")
     cause = outcome.cause and f"{outcome.cause} failed, {find(outcome.cause).broken}"
     if because := cause or outcome.why:
         because = f"{outcome.verdict}: {because}"
-        verdict = "skipped" if outcome.cause else VERDICTS[_counting(outcome, named)].junit
+        verdict = "skipped" if outcome.cause else VERDICTS[_counting(outcome, named, ())].junit
         return msgspec.structs.replace(case, verdict=verdict, lines=(because,))
     if outcome.failures:
         lines = (*map(failure_text, outcome.failures), rule.text, f"({rule.source})")
+        if rule.id in known:
+            lines = (f"known to fail: {known[rule.id]}", *lines)
+            return msgspec.structs.replace(case, verdict="skipped", lines=lines)
         return msgspec.structs.replace(case, verdict="failure", lines=lines)
     return case
 
 
-def _print_json(outcomes: Sequence[Outcome]) -> None:
+def _print_json(outcomes: Sequence[Outcome], known: Mapping[str, str]) -> None:
     for outcome in outcomes:
         first = msgspec.structs.asdict(outcome.failures[0]) if outcome.failures else None
         if first:
@@ -272,6 +311,7 @@ def _print_json(outcomes: Sequence[Outcome]) -> None:
             "cause": outcome.cause or None,
             "hint": outcome.hint or None,
             "why": outcome.why or None,
+            "known": known.get(outcome.rule),
             "failures": len(outcome.failures),
             "first": first,
             "faults": outcome.fault_count,
@@ -279,7 +319,13 @@ def _print_json(outcomes: Sequence[Outcome]) -> None:
         click.echo(json_bytes(line))
 
 
-def _print_table(outcomes: Sequence[Outcome], rules: Sequence[Rule], quiet: bool, everything: bool) -> None:
+def _print_table(
+    outcomes: Sequence[Outcome],
+    rules: Sequence[Rule],
+    quiet: bool,
+    everything: bool,
+    known: Mapping[str, str],
+) -> None:
     hidden, begin = hidden_by(outcomes), ""
     if hidden:
         first_cause = next(iter(hidden))
@@ -287,12 +333,15 @@ def _print_table(outcomes: Sequence[Outcome], rules: Sequence[Rule], quiet: bool
         show(begin := begin_with(cause, hidden[first_cause]))
     table = plain_table("rule", "name", "verdict", "first failure")
     for outcome in causes_first(outcomes, list(hidden)):
-        if (quiet and not outcome.failures) or (outcome.cause and not everything):
+        is_known = outcome.rule in known and bool(outcome.failures)
+        if (quiet and (is_known or not outcome.failures)) or (outcome.cause and not everything):
             continue
         first = failure_text(outcome.failures[0]) if outcome.failures else outcome.why
         if outcome.hint and outcome.hint not in begin:
             first = f"{outcome.hint}; {first}"
         because = f"presupposes {outcome.cause}, which failed" if outcome.cause else first
+        if is_known:
+            because = f"known: {known[outcome.rule]}; {because}"
         table.add_row(outcome.rule, find(outcome.rule).name, outcome.verdict, because)
     if table.rows:
         show(table)
@@ -301,13 +350,15 @@ def _print_table(outcomes: Sequence[Outcome], rules: Sequence[Rule], quiet: bool
             show(f"{_rules(ids)} not judged because {id} failed: {spans(ids)}")
     if not quiet:
         left_out = [rule.id for rule in LONG if rule not in rules] if len(rules) == len(RULES) else []
-        show(_counts(outcomes) + (f"; --long tries {', '.join(left_out)} too" if left_out else ""))
+        show(_counts(outcomes, known) + (f"; --long tries {', '.join(left_out)} too" if left_out else ""))
 
 
-def _counts(outcomes: Sequence[Outcome]) -> str:
+def _counts(outcomes: Sequence[Outcome], known: Collection[str]) -> str:
     verdicts = [outcome.verdict for outcome in outcomes]
     tried = amount(len(outcomes), "rule")
     text = f"{tried}: {verdicts.count('passed')} passed, {verdicts.count('failed')} failed"
+    expected = [one for one in outcomes if one.rule in known and one.failures]
+    text += f" ({len(expected)} of them known)" * bool(expected)
     others = [f", {verdicts.count(one)} {one}" for one in ("not judged", "not observable") if one in verdicts]
     return text + "".join(others)
 

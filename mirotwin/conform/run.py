@@ -127,11 +127,17 @@ FEWEST = 10
 
 
 def try_all(
-    rules: Sequence[Rule], image: Image, seed: int = 0, keep: bool = False, ahead: bool = False
+    rules: Sequence[Rule],
+    image: Image,
+    seed: int = 0,
+    keep: bool = False,
+    ahead: bool = False,
+    everything: bool = False,
 ) -> Iterator[Outcome]:
     """Each as soon as it is known, those that others presuppose first; see `with_faults`. `ahead`: by two processes.
 
-    A rule is not judged where one of `rules` failed that it presupposes: then its trial is not run.
+    A rule is not judged where one of `rules` failed that it presupposes: then its trial is not run, unless `everything`
+    is tried.
     """
     forbidden = {kind: rule.id for rule in rules for kind in rule.faults}
     tried = partial(_try_and_explain, image=image, seed=seed, keep=keep, forbidden=forbidden)
@@ -143,7 +149,7 @@ def try_all(
                 return theirs[rule.id].result()
         return tried(rule)
 
-    outcomes = in_order(rules, outcome_of)
+    outcomes = in_order(rules, outcome_of, everything)
     # before the process is copied: the first trial loads what every trial needs
     yield from islice(outcomes, 1)
     _copied["tried"] = tried
@@ -184,11 +190,16 @@ def _try_and_explain(
     return msgspec.structs.replace(outcome, hint=hint)
 
 
-def in_order(rules: Sequence[Rule], tried: Callable[[Rule], Outcome]) -> Iterator[Outcome]:
-    """Tries presupposed rules first. A rule is not `tried` where one of `rules` that it presupposes failed."""
+def in_order(
+    rules: Sequence[Rule], tried: Callable[[Rule], Outcome], everything: bool = False
+) -> Iterator[Outcome]:
+    """Tries presupposed rules first. A rule is not `tried` where one of `rules` that it presupposes failed, unless
+    `everything` is.
+    """
     causes: dict[str, str] = {}
     for rule in presupposed_first(rules):
-        cause = next((causes[one.id] for one in presupposed(rule) if one.id in causes), "")
+        failed = () if everything else presupposed(rule)
+        cause = next((causes[one.id] for one in failed if one.id in causes), "")
         outcome = Outcome(rule.id, (), cause=cause) if cause else tried(rule)
         if outcome.failures or outcome.cause:
             causes[rule.id] = outcome.cause or rule.id

@@ -1,6 +1,7 @@
 """Which rule is judged, what `mirotwin conform` begins with, and what it says of usual mistakes."""
 
 import re
+from pathlib import Path
 
 import msgspec
 import pytest
@@ -10,11 +11,13 @@ from hypothesis import strategies as st
 from mirotwin.conform import run
 from mirotwin.conform.rules import RULES, find, presupposed
 from mirotwin.conform.run import Outcome, try_all, with_faults
+from mirotwin.shell.firmware_image import load_firmware
 from mirotwin.verify.checks.interface import Failure
 from tests.mirotwin.conform.images import FAULTS, HANGS, image_of
 from tests.mirotwin.conform.mistakes import MISTAKES
 from tests.mirotwin.verify.checks.rig import built, needs_sdcc, own_image
 
+ROOT = Path(__file__).parents[3]
 pytestmark = pytest.mark.slow
 
 
@@ -107,9 +110,14 @@ def test_the_table_begins_with_the_rule_that_hides_most_and_folds_those_that_it_
     assert (
         lines[-1] == f"{len(RULES)} rules: 0 passed, 1 failed, {others} not judged; --long tries P61, P62 too"
     )
-    _, out, _ = mirotwin("conform", image, "--all")
-    rows = [line for line in out.splitlines() if "not judged  presupposes P24, which failed" in line]
-    assert len(rows) == others
+
+
+def test_all_also_tries_rules_of_which_a_presupposition_failed():
+    late = load_firmware(f"{ROOT / 'examples' / 'firmware' / 'late.ihx'}")
+    rules = [find(id) for id in ("P29", "P30", "P43")]
+    assert [one.cause for one in try_all(rules, late)] == ["", "P29", "P29"]
+    outcomes = list(try_all(rules, late, everything=True))
+    assert [one.verdict for one in outcomes] == ["failed", "failed", "passed"]
 
 
 def planted_image(name):
