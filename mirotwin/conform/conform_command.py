@@ -7,27 +7,27 @@ from pathlib import Path
 from typing import Annotated
 
 import click
-import msgspec
 
 from miro_exact.bad_input import BadInput, amount
 from miro_robot.image import Image
 from mirotwin.conform import baseline
+from mirotwin.conform.conform_results import RuleCases
 from mirotwin.conform.explain import explain
 from mirotwin.conform.rule import Rule
 from mirotwin.conform.rules import ALL as EVERY_RULE
-from mirotwin.conform.rules import LONG, RULES, chapter_of, find, spans
+from mirotwin.conform.rules import LONG, RULES, find, spans
 from mirotwin.conform.run import Outcome, case_names, failure_text, try_all, with_faults
 from mirotwin.desk.guard import DeskOptions
 from mirotwin.shell.command import Argument, Option, Options, command_of
 from mirotwin.shell.console import plain_table, show
 from mirotwin.shell.firmware_image import load_firmware
 from mirotwin.shell.json_text import json_bytes
-from mirotwin.shell.junit import TestCase, junit_xml
 from mirotwin.shell.options import ALL, ARTIFACTS, JSON, JUNIT, NAME, PATH, QUIET, SEED, Engine, StackFrom
-from mirotwin.shell.outputs import check_file, whole_file
+from mirotwin.shell.outputs import check_file
 from mirotwin.shell.program import complain, show_line
 from mirotwin.shell.progress import ProgressBar
-from mirotwin.shell.verdicts import DONE, VERDICTS, Verdict, exit_code
+from mirotwin.shell.results import Results
+from mirotwin.shell.verdicts import DONE, VERDICTS, exit_code
 from mirotwin.verify.cases.artifacts import (
     FIRMWARE,
     case_lines,
@@ -73,7 +73,7 @@ class ConformOptions(Options, frozen=True, kw_only=True):
         Option(metavar="ID", help="Show what happened in the trial of one rule, and try no other."),
     ] = None
     as_json: Annotated[
-        bool, JSON.saying("One line of JSON a rule instead of the table.", apart="explain")
+        bool, JSON.saying("Print one JSON document; with --list a line a rule.", apart="explain")
     ] = False
     junit: Annotated[Path | None, JUNIT.saying(JUNIT.help, apart="explain")] = None
     artifacts: Annotated[
@@ -88,6 +88,11 @@ class ConformOptions(Options, frozen=True, kw_only=True):
     engine: Engine = None
     desk: DeskOptions = DeskOptions()
     quiet: Annotated[bool, QUIET.saying("No progress bar, and of the table the rules that failed.")] = False
+
+    def line_for(self, rule: str) -> str:
+        """The command that tries this rule again."""
+        image, seed, stack_from = self.image, self.seed, self.stack_from
+        return ConformOptions(image=image, ids=(rule,), seed=seed, stack_from=stack_from).command_line()
 
 
 def hidden_by(outcomes: Sequence[Outcome]) -> dict[str, list[str]]:
@@ -168,7 +173,7 @@ def conform(options: ConformOptions) -> int:
             raise BadInput("", given[0], "is not for a robot at a port", "leave it out")
         from mirotwin.conform.by_answers import try_at_port  # loads pyserial
 
-        properties = {"port": at_port}
+        properties: dict[str, str | int | float] = {"port": at_port}
         tried = try_at_port(rules, options.desk, complain, options.everything)
     else:
         firmware = load_firmware(options.image, named=False, stack_from=options.stack_from)
@@ -176,8 +181,8 @@ def conform(options: ConformOptions) -> int:
             return _explain(find(options.explain), firmware, options.seed)
         if artifacts is not None:
             _make_room(artifacts, rules)
-        sha256, seed = firmware.sha256, f"{options.seed}"
-        properties = {"firmware": firmware.path.name, "firmware_sha256": sha256, "seed": seed}
+        name, sha256 = firmware.path.name, firmware.sha256
+        properties = {"firmware": name, "firmware_sha256": sha256, "seed": options.seed}
         tried = try_all(rules, firmware, options.seed, artifacts is not None, True, options.everything)
     outcomes: list[Outcome] = []
     lost: BadInput | None = None
@@ -191,40 +196,35 @@ def conform(options: ConformOptions) -> int:
                     unwritten = _keep(outcome, artifacts, firmware)
         except BadInput as error:  # a robot that was lost: outcomes before that are reported
             lost = error
+    if lost is not None and not outcomes:
+        raise lost
     outcomes = with_faults(outcomes, rules)
     cured = [one.rule for one in outcomes if one.rule in known and one.verdict == "passed"]
     if options.baseline is not None and options.write_baseline and lost is None:
         known = baseline.write(options.baseline, known, outcomes)
-    if outcomes or lost is None:
-        _report(outcomes, rules, options, known)
+    image = None if at_port else firmware
+    rule_cases = RuleCases(
+        outcomes, bool(options.ids), known, image, options.seed, artifacts, options.line_for
+    )
+    verdict = rule_cases.verdict
+    reported = options.as_json or junit is not None  # then a failure runs once more, for its place
+    cases = rule_cases.cases() if reported else ()
+    results = Results(command="conform", cases=cases, verdict=verdict, facts=properties)
+    if options.as_json:
+        results.print_json()
+    else:
+        _print_table(outcomes, rules, options, known)
     if cured and not options.write_baseline:
-        remedy = (
-            f"take {'it' if len(cured) == 1 else 'them'} out of {options.baseline}, or give --write-baseline"
-        )
+        them = "it" if len(cured) == 1 else "them"
+        remedy = f"take {them} out of {options.baseline}, or give --write-baseline"
         complain(f"{', '.join(cured)}: known to fail, but passed; {remedy}")
     if unwritten:
         complain(unwritten)
     _report_faults(outcomes)
-    if options.junit is not None and (outcomes or lost is None):  # reported first: the file may fail
-        cases = [_test_case(one, bool(options.ids), known) for one in outcomes]
-        with whole_file(options.junit, "--junit") as part:
-            part.write_bytes(junit_xml("mirotwin conform", cases, properties))
+    results.write_junit(junit)  # reported first: the file may fail
     if lost is not None:
         raise lost
-    forbidden = {kind for id in known for kind in find(id).faults}
-    faults = [
-        "fault" for one in outcomes for _, _, fault in one.faults if fault.kind not in forbidden
-    ]  # whose rule is known to fail
-    return exit_code(*faults, *(_counting(one, bool(options.ids), known) for one in outcomes))
-
-
-def _counting(outcome: Outcome, named: bool, known: Collection[str]) -> Verdict:
-    """The verdict that counts for the exit code. That a rule is not judged does only where somebody has named it, and
-    that one of `known` fails, or one that presupposes it is not judged, does not.
-    """
-    if outcome.rule in known or outcome.cause in known:
-        return "passed"
-    return "not observable" if outcome.verdict == "not judged" and not named else outcome.verdict
+    return VERDICTS[verdict].code
 
 
 def _keep(outcome: Outcome, artifacts: Path, firmware: Image) -> str:
@@ -236,17 +236,6 @@ def _keep(outcome: Outcome, artifacts: Path, firmware: Image) -> str:
     except (OSError, BadInput) as error:
         return nothing_left(artifacts, error)
     return ""
-
-
-def _report(
-    outcomes: Sequence[Outcome], rules: Sequence[Rule], options: ConformOptions, known: Mapping[str, str]
-) -> None:
-    if options.as_json:
-        _print_json(outcomes, known)
-        return
-    _print_table(outcomes, rules, options.quiet, options.everything, known)
-    if options.artifacts is not None and not options.quiet:
-        _print_replays(outcomes, options.artifacts)
 
 
 def _explain(rule: Rule, firmware: Image, seed: int) -> int:
@@ -282,50 +271,10 @@ def _list(rules: Sequence[Rule], as_json: bool) -> None:
     show(table)
 
 
-def _test_case(outcome: Outcome, named: bool, known: Mapping[str, str]) -> TestCase:
-    """Without a time: the same image gives the same bytes. `named`: the user named this rule."""
-    rule = find(outcome.rule)
-    case = TestCase(f"{rule.id} {rule.name}", f"conform.{chapter_of(rule).title}")
-    cause = outcome.cause and f"{outcome.cause} failed, {find(outcome.cause).broken}"
-    if because := cause or outcome.why:
-        because = f"{outcome.verdict}: {because}"
-        verdict = "skipped" if outcome.cause else VERDICTS[_counting(outcome, named, ())].junit
-        return msgspec.structs.replace(case, verdict=verdict, lines=(because,))
-    if outcome.failures:
-        lines = (*map(failure_text, outcome.failures), rule.text, f"({rule.source})")
-        if rule.id in known:
-            lines = (f"known to fail: {known[rule.id]}", *lines)
-            return msgspec.structs.replace(case, verdict="skipped", lines=lines)
-        return msgspec.structs.replace(case, verdict="failure", lines=lines)
-    return case
-
-
-def _print_json(outcomes: Sequence[Outcome], known: Mapping[str, str]) -> None:
-    for outcome in outcomes:
-        first = msgspec.structs.asdict(outcome.failures[0]) if outcome.failures else None
-        if first:
-            del first["alone_hz"]  # a rule's trial always has robots
-        line = {
-            "rule": outcome.rule,
-            "verdict": outcome.verdict,
-            "cause": outcome.cause or None,
-            "hint": outcome.hint or None,
-            "why": outcome.why or None,
-            "known": known.get(outcome.rule),
-            "failures": len(outcome.failures),
-            "first": first,
-            "faults": outcome.fault_count,
-        }
-        click.echo(json_bytes(line))
-
-
 def _print_table(
-    outcomes: Sequence[Outcome],
-    rules: Sequence[Rule],
-    quiet: bool,
-    everything: bool,
-    known: Mapping[str, str],
+    outcomes: Sequence[Outcome], rules: Sequence[Rule], options: ConformOptions, known: Mapping[str, str]
 ) -> None:
+    quiet, everything = options.quiet, options.everything
     hidden, begin = hidden_by(outcomes), ""
     if hidden:
         first_cause = next(iter(hidden))
@@ -348,9 +297,12 @@ def _print_table(
     if not everything:
         for id, ids in hidden.items():
             show(f"{_rules(ids)} not judged because {id} failed: {spans(ids)}")
-    if not quiet:
-        left_out = [rule.id for rule in LONG if rule not in rules] if len(rules) == len(RULES) else []
-        show(_counts(outcomes, known) + (f"; --long tries {', '.join(left_out)} too" if left_out else ""))
+    if quiet:
+        return
+    left_out = [rule.id for rule in LONG if rule not in rules] if len(rules) == len(RULES) else []
+    show(_counts(outcomes, known) + (f"; --long tries {', '.join(left_out)} too" if left_out else ""))
+    if options.artifacts is not None:
+        _print_replays(outcomes, options.artifacts)
 
 
 def _counts(outcomes: Sequence[Outcome], known: Collection[str]) -> str:

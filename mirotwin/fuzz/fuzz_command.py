@@ -35,7 +35,7 @@ from mirotwin.fuzz.files import CampaignFolder, check_outside, unused
 from mirotwin.fuzz.input_coverage import InputCoverage
 from mirotwin.fuzz.making import make_target
 from mirotwin.fuzz.oracle import oracle_of
-from mirotwin.fuzz.results import Results, clock
+from mirotwin.fuzz.results import CampaignResults, clock
 from mirotwin.fuzz.spec import TargetSpec
 from mirotwin.fuzz.target import Target
 from mirotwin.fuzz.triage import MINIMISE_S, Crash, Triage
@@ -45,8 +45,24 @@ from mirotwin.shell.command import Argument, Option, Options, command_of
 from mirotwin.shell.console import show
 from mirotwin.shell.debug_files import SourceFolders, source_folders
 from mirotwin.shell.firmware_image import image_for, load_firmware
-from mirotwin.shell.options import BAUD, FIRMWARE, FORCE, JOBS, NAME, OUT, PATH, QUIET, SEED, SET, SLOT, Whole
+from mirotwin.shell.options import (
+    BAUD,
+    FIRMWARE,
+    FORCE,
+    JOBS,
+    JSON,
+    JUNIT,
+    NAME,
+    OUT,
+    PATH,
+    QUIET,
+    SEED,
+    SET,
+    SLOT,
+    Whole,
+)
 from mirotwin.shell.options import Engine as EngineOption
+from mirotwin.shell.outputs import check_file
 from mirotwin.shell.plugin_files import PART, PluginFiles
 from mirotwin.shell.processes import cores
 from mirotwin.shell.program import Terminated, complain, show_line
@@ -133,6 +149,8 @@ class FuzzOptions(Options, frozen=True, kw_only=True):
     ] = MINIMISE_S
     sources: SourceFolders = ()
     engine: EngineOption = None
+    as_json: Annotated[bool, JSON.saying("Print one JSON document instead of the results.")] = False
+    junit: Annotated[Path | None, JUNIT] = None
     quiet: Annotated[bool, QUIET.saying("No progress, and of the results only what failed.")] = False
     bare: Annotated[
         bool,
@@ -297,6 +315,8 @@ def _campaign(
     default = Path("runs") / f"fuzz-{image.path.stem}"
     folder = CampaignFolder(options.out or (default if options.force else unused(default)), options.force)
     check_outside(folder.path, options.corpus)
+    if options.junit is not None:
+        check_file(options.junit, "--junit", options.image, options.firmware)
     covering = _covering(options.covering, image)
     target = make_target(spec)
     oracle = oracle_of(target, expected)
@@ -376,14 +396,16 @@ def _run(campaign: Campaign, time_s: float, options: FuzzOptions) -> int:
             with suppress(BadInput, PluginError):
                 left = campaign.finish(INTERRUPTED_S)
     own = in_files(options.expected)
-    code = _report(Results(campaign, left, stopped is None, own, PluginFiles(parts=options.parts)), quiet)
+    plugins = PluginFiles(parts=options.parts)
+    code = _report(CampaignResults(campaign, left, stopped is None, own, plugins), options)
     if stopped is not None:
         raise stopped
     return code
 
 
-def _report(results: Results, quiet: bool) -> int:
+def _report(results: CampaignResults, options: FuzzOptions) -> int:
     """Shows what a campaign came to, then writes its files; the exit code."""
+    quiet = options.quiet or options.as_json
     if not quiet:
         for part in results.overview():
             if isinstance(part, str):
@@ -392,9 +414,13 @@ def _report(results: Results, quiet: bool) -> int:
                 show(part)
     for note in results.notes():
         complain(note)
-    for line in results.crashes():
-        show_line(line)
+    if options.as_json:
+        results.for_programs.print_json()
+    else:
+        for line in results.crashes():
+            show_line(line)
     results.write()  # after the results were shown: a full disk must not hide them
+    results.for_programs.write_junit(options.junit)
     if not quiet:
         show_line(f"written to {results.out}")
     return VERDICTS[results.verdict].code

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterator, Mapping
+from functools import cached_property
 from typing import Any
 
 import msgspec
@@ -14,8 +15,11 @@ from miro_robot.inspect.lcov import Tracefile
 from mirotwin.firmware.coverage_files import table, write
 from mirotwin.fuzz.campaign import Campaign
 from mirotwin.fuzz.triage import UNCONFIRMED, Crash
+from mirotwin.shell.debug_files import Places
 from mirotwin.shell.json_text import json_bytes
+from mirotwin.shell.junit import TestCase
 from mirotwin.shell.plugin_files import NO_FILES, PluginFiles
+from mirotwin.shell.results import Results
 from mirotwin.shell.verdicts import Verdict
 from mirotwin.verify.cases.replay_line import debug_line, foreign_path, replay_line
 
@@ -23,7 +27,7 @@ COVERAGE = "coverage.info"
 SUMMARY = "summary.json"
 
 
-class Results:
+class CampaignResults:
     """Of a campaign that is over. `left`: inputs that were not looked at; `complete`: it came to the end of its time.
 
     `in_files`: the checks of --expect that are in a file, by their name, as FILE.py:CLASS; `plugins`: parts of --part.
@@ -51,9 +55,14 @@ class Results:
     @property
     def verdict(self) -> Verdict:
         """Failed: something was found, a function was not reached, or a check had no occasion."""
+        return "failed" if self.triage.confirmed else self._unfinished
+
+    @property
+    def _unfinished(self) -> Verdict:
+        """Without what was found."""
         missed = self.campaign.covering is not None and self.campaign.reached_by is None
         unjudged = "not judged" in self._open_checks().values()
-        return "failed" if self.triage.confirmed or missed or unjudged else "passed"
+        return "failed" if missed or unjudged else "passed"
 
     def overview(self) -> Iterator[str | Table]:
         """Lines, and a table of the coverage."""
@@ -106,6 +115,35 @@ class Results:
         write(self.coverage.tracefile, self.coverage, self.out / COVERAGE, "--out")
         self.triage.folder.write("", SUMMARY, json_bytes(self._summary(), indent=2) + b"\n")
 
+    @cached_property
+    def for_programs(self) -> Results:
+        """A case for the campaign, which fails without a crash too, and one for each crash."""
+        cases = [TestCase("campaign", "fuzz", verdict=self._unfinished, lines=[*self.notes()])]
+        cases += [self._case(crash) for crash in self.triage.found]
+        verdict, summary = self.verdict, self._summary()
+        return Results(command="fuzz", cases=cases, verdict=verdict, facts=self._facts(), summary=summary)
+
+    def _facts(self) -> dict[str, str | int | float]:
+        image = self.triage.target.image
+        return {"firmware": image.path.name, "firmware_sha256": image.sha256}
+
+    def _case(self, crash: Crash) -> TestCase:
+        """What is not confirmed in a World does not count. The place is the instruction behind it."""
+        replay, at_failure = self._commands(crash)
+        facts: dict[str, str | int | float] = {"replay": replay, "debug": at_failure, "reproduce": replay}
+        place = None if crash.pc is None else self._places.at(crash.pc)
+        if place is not None:
+            facts |= {"file": place.file, "line": place.line}
+        facts |= {"cause": f"{crash.function} {crash.cause}".strip()} if crash.cause else {}
+        lines = [crash.verdict]
+        return TestCase(
+            crash.name, "fuzz", verdict="failed", counts=crash.confirmed, lines=lines, facts=facts
+        )
+
+    @cached_property
+    def _places(self) -> Places:
+        return Places(self.triage.target.image)
+
     def _open_checks(self) -> dict[str, Verdict]:
         """The checks of --expect that judged no input."""
         verdicts = self.campaign.verdicts
@@ -122,11 +160,16 @@ class Results:
         again = f"; {amount(more, 'more input')}" if more else ""
         before, after = crash.sizes
         yield f"  {crash.name}{where}: {crash.verdict} ({amount(after, 'byte')}, found with {before}{again})"
+        for line in self._commands(crash):
+            yield f"    {line}"
+
+    def _commands(self, crash: Crash) -> tuple[str, str]:
+        """The commands that play its case again, and that stand at it."""
         expected = (self.in_files[crash.check],) if crash.check in self.in_files else ()
         stream = self.out / crash.folder / f"{crash.name}.stream"
         image = foreign_path(self.triage.target.image)
-        yield f"    {replay_line(stream, image, expected, self.plugins)}"
-        yield f"    {debug_line(stream, image, expected=expected, plugins=self.plugins)}"
+        again = replay_line(stream, image, expected, self.plugins)
+        return again, debug_line(stream, image, expected=expected, plugins=self.plugins)
 
     def _summary(self) -> dict[str, Any]:
         campaign, progress, tracefile = self.campaign, self.progress, self.coverage.tracefile

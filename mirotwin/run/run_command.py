@@ -9,6 +9,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 import click
+from msgspec.structs import replace
 
 from miro_exact.bad_input import BadInput
 from miro_exact.clock import TICKS_PER_SECOND
@@ -17,6 +18,8 @@ from mirotwin.recording.recorder import source_of
 from mirotwin.run.run_files import RunFiles, Stops, digest_in
 from mirotwin.run.run_options import RunOptions
 from mirotwin.runs.board_summary import AnySummary
+from mirotwin.runs.failure_place import located
+from mirotwin.runs.result import Result
 from mirotwin.runs.run import Run
 from mirotwin.runs.spec import RunSpec
 from mirotwin.runs.summary import Summary
@@ -24,10 +27,11 @@ from mirotwin.shell.command import command_of
 from mirotwin.shell.firmware_image import image_for
 from mirotwin.shell.held_signals import held_signals
 from mirotwin.shell.options import plain_parameters
-from mirotwin.shell.outputs import FILES, OutputFolder
+from mirotwin.shell.outputs import FILES, OutputFolder, check_file
 from mirotwin.shell.plugin_files import unused_in
 from mirotwin.shell.program import complain, tell_notes
 from mirotwin.shell.progress import ProgressBar
+from mirotwin.shell.results import Results
 from mirotwin.verify.checks.expect import expectations_in
 from mirotwin.verify.expectations import as_settings
 from mirotwin.verify.steps.reading import steps_in
@@ -81,6 +85,8 @@ def run(options: RunOptions) -> int:
     if stops and (steps or record == "full"):
         other = f"the steps of {options.scenario}" if steps else "--record full"
         raise click.UsageError(f"--save-at, --resume and --to do not go with {other}.")
+    if options.junit is not None:
+        check_file(options.junit, "--junit", options.scenario, options.firmware, options.resume)
     default = Path("runs") / f"{text.scenario.name}-{seed}"
     folder = OutputFolder(
         options.out or default, options.force, (*FILES, *stops.names), ours=options.out is None
@@ -101,7 +107,8 @@ def run(options: RunOptions) -> int:
         world = spec.world()
         stops.begin(world)
     source = source_of(text, world, record, stops.resumed)
-    under_way = Run(spec, world)
+    for_programs = options.as_json or options.junit is not None
+    under_way = Run.traced(spec, world) if for_programs else Run(spec, world)
     views: list[View] = []
     if options.frames is not None or options.record_frames:
         from mirotwin.camera.view import views_of  # loads the pictures' library
@@ -130,14 +137,29 @@ def run(options: RunOptions) -> int:
     if earlier not in ("", summary.digest):
         note = f"{folder.path} held a run with other bits (digest {earlier[:12]}..), now replaced"
         tell_notes([f"{note}; --out keeps both"])
-    if not options.quiet:
+    if not (options.quiet or options.as_json):
         from mirotwin.shell.console import show
 
         show(_table(summary, run_files, folder.path))
     result = under_way.result()
+    if for_programs:
+        _report(under_way, result, summary, options)
     complain(*result.texts)
     under_way.keep_saved(folder.path)
     return result.code
+
+
+def _report(run: Run, result: Result, summary: AnySummary, options: RunOptions) -> None:
+    """One case: the run."""
+    if run.trace is not None:  # a run that was resumed is not known from its beginning
+        result = located(run, result)
+    again = replace(options, out=None, force=False, as_json=False, junit=None, no_figure=False, quiet=False)
+    result = replace(result, again=again.command_line())
+    case = result.as_case(run.world.scenario.name, "run")
+    results = Results(command="run", cases=[case], verdict=result.verdict, summary=summary)
+    if options.as_json:
+        results.print_json()
+    results.write_junit(options.junit)
 
 
 def _duration(options: RunOptions, settings: tuple[str, ...]) -> tuple[str, ...]:

@@ -11,6 +11,8 @@ from miro_sim.scenario.file import LONGEST_S
 from mirotwin.shell.command import Option, Options
 from mirotwin.shell.options import (
     FORCE,
+    JSON,
+    JUNIT,
     OUT,
     PATH,
     QUIET,
@@ -82,5 +84,7 @@ class RunOptions(Options, frozen=True, kw_only=True):
     to_time: Annotated[Time | None, TO.saying("End the run there.")] = None
     resume: Annotated[str | None, RESUME] = None
     force: Annotated[bool, FORCE.saying("Replace the files of an earlier run in the folders.")] = False
+    as_json: Annotated[bool, JSON.saying("Print one JSON document instead of the table.")] = False
+    junit: Annotated[Path | None, JUNIT] = None
     no_figure: Annotated[bool, Option(help="Do not draw figure.svg.")] = False
     quiet: Annotated[bool, QUIET.saying("No progress bar and no table.")] = False

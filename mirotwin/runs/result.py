@@ -10,6 +10,8 @@ from miro_exact.bad_input import amount
 from miro_exact.clock import NEVER_TICK, TICKS_PER_SECOND
 from miro_sim.world.device import Device
 from miro_sim.world.robot import Robot
+from mirotwin.shell.debug_files import Place
+from mirotwin.shell.junit import TestCase
 from mirotwin.shell.verdicts import VERDICTS, Verdict
 from mirotwin.verify.checks.expect import ALWAYS_ON
 from mirotwin.verify.checks.interface import Expectation, Failure
@@ -27,7 +29,8 @@ class Result(msgspec.Struct, frozen=True, kw_only=True):
     `expectations`: of all checks. `done` of `steps`; `unseen`: steps and expectations that no port shows. `tick`: where
     the run ended; `clock`: ticks per second. `left`: the folder with its case; `left_out`: what settings left out,
     a line each. `again`: the command that gives the verdict again; `error`: why there was no run. `has_page`: whether
-    `mirotwin report` makes a page of it.
+    `mirotwin report` makes a page of it. `step_tick`: where a step failed, -1 if none did. `place`: the C line at which
+    the debugger stands at what failed first. `commands`: those that play the failure again and stand at it.
     """
 
     path: str = ""
@@ -48,20 +51,35 @@ class Result(msgspec.Struct, frozen=True, kw_only=True):
     again: str = ""
     error: Exception | None = None
     has_page: bool = True
+    step_tick: int = -1
+    place: Place | None = None
+    commands: Sequence[str] = ()
 
     @property
     def code(self) -> int:
         """The exit code."""
         return VERDICTS[self.verdict].code
 
-    def facts(self) -> dict[str, str]:
-        """What names the run, as JUnit has it."""
-        return {
-            "seed": f"{self.seed}",
+    @property
+    def failed_tick(self) -> int:
+        """Where it failed first; -1 if nothing did that has a time."""
+        ticks = [self.step_tick] * (self.step_tick >= 0) + [one.tick for one in self.failures]
+        return ticks[0] if ticks else -1
+
+    def facts(self) -> dict[str, str | int | float]:
+        """What names the run, and when and where it failed."""
+        facts: dict[str, str | int | float] = {
+            "seed": self.seed,
             "digest": self.digest,
             "firmware_sha256": self.firmware_sha256,
             "reproduce": self.again,
         }
+        return facts | failure_facts(self.failed_tick, self.clock, self.place, self.commands)
+
+    def as_case(self, name: str, classname: str, time_s: float | None = None) -> TestCase:
+        """For reports."""
+        lines = (*self.lines, *self.notes)
+        return TestCase(name, classname, time_s, self.verdict, lines=lines, facts=self.facts())
 
     @property
     def texts(self) -> tuple[str, ...]:
@@ -79,6 +97,18 @@ class Result(msgspec.Struct, frozen=True, kw_only=True):
         """What else there is to say."""
         wrong = self.lines
         return tuple(text for text in self.texts if text not in wrong)
+
+
+def failure_facts(
+    tick: int, clock: int = TICKS_PER_SECOND, place: Place | None = None, commands: Sequence[str] = ()
+) -> dict[str, str | int | float]:
+    """When and where something failed, and the two commands of `case_lines`, as far as they are known."""
+    facts: dict[str, str | int | float] = {}
+    if tick >= 0:
+        facts |= {"tick": tick, "at_ms": round(1000 * tick / clock, 3)}
+    if place is not None:
+        facts |= {"file": place.file, "line": place.line}
+    return facts | dict(zip(("replay", "debug"), commands, strict=False))
 
 
 def expectation_lines(checks: Checks) -> Iterator[Line]:

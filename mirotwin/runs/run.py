@@ -192,6 +192,7 @@ class Run:
             expectations=[one for group in self.judges for one in group.verdicts()],
             done=0 if player is None else player.done,
             steps=0 if player is None else player.count,
+            step_tick=-1 if player is None or player.failure is None else player.failure.tick,
             tick=world.tick if self.tick < 0 else self.tick,
             clock=world.clock,
             seed=self.spec.seed,
@@ -259,24 +260,27 @@ class Run:
 
         None where the check passes, or cannot be one: a wait for no time at all.
         """
+        try:
+            again = Run(self.as_sent(expect)).play()
+        except BadInput:
+            return None
+        failure = next((one for one in again.failures if one.check in expect), None)
+        return None if failure is None else self.stream(expect, str(failure))
+
+    def as_sent(self, expect: Mapping[str, Any]) -> RunSpec:
+        """The same run up to here, as what went into it: without hosts that compute, and without steps."""
         world = self.world
         scenario = msgspec.structs.replace(world.scenario, expect=dict(expect))
         if isinstance(scenario, BoardScenario):  # at the rate at which it was sent
             bit_ticks = world.lines[0].outbox.character_ticks // CHARACTER_BITS
             scenario = msgspec.structs.replace(scenario, step=(), bit_ticks=bit_ticks)
-        spec = RunSpec(
+        return RunSpec(
             scenario=scenario,
             image=world.image,
             seed=world.seed,
             script=self.script(),
             until_tick=world.tick,
         )
-        try:
-            again = Run(spec).play()
-        except BadInput:
-            return None
-        failure = next((one for one in again.failures if one.check in expect), None)
-        return None if failure is None else self.stream(expect, str(failure))
 
     def script(self) -> Sequence[ScriptItem]:
         """What went into it."""

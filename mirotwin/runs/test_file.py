@@ -16,11 +16,21 @@ from miro_robot.image import Image
 from miro_sim.scenario.board_scenario import AnyText, BoardText, load_any
 from miro_sim.world.machine import NotObservable
 from mirotwin.desk.guard import DeskOptions
+from mirotwin.runs.failure_place import located
 from mirotwin.runs.result import Result
 from mirotwin.runs.run import Run
 from mirotwin.runs.spec import RunSpec
 from mirotwin.shell.firmware_image import image_for
-from mirotwin.verify.cases.artifacts import clear, leave, nothing_left, report_line, stream_files
+from mirotwin.verify.cases.artifacts import (
+    CASE,
+    FIRMWARE,
+    case_lines,
+    clear,
+    leave,
+    nothing_left,
+    report_line,
+    stream_files,
+)
 from mirotwin.verify.cases.case import SUFFIX as CASE_SUFFIX
 from mirotwin.verify.cases.case import is_case
 from mirotwin.verify.checks.expect import expectations_in
@@ -88,14 +98,14 @@ def _run(
             path, f"step {saving[0].number}", "there is no folder to save into", "give --artifacts DIR"
         )
     spec = replace(RunSpec.of(text, image, seed), expected=expected, steps=steps)
-    run = Run(spec) if folder is None else Run.traced(spec)
+    run = Run.traced(spec)
     case = None
     if run.player is not None:
         run.player.play()
         case = None if folder is None else run.case_of_step()
     run.drive(move=run.player.finish if run.player else None)
     run.finish()
-    result = replace(run.result(), left_out=text.notes, again=again(bool(saving)))
+    result = replace(located(run, run.result()), left_out=text.notes, again=again(bool(saving)))
     return result if folder is None else _with_artifacts(run, case, result, folder, text)
 
 
@@ -110,7 +120,8 @@ def _with_artifacts(run: Run, case: str | None, result: Result, folder: Path, te
             case = case or (run.case() if run.failures else None)
             files = stream_files(case, run.stream(), run.spec.image)
             leave(folder, "\n".join((*lines, "")), {SCENARIO: encodable(text.text).encode(), **files})
-            return replace(result, left=str(folder))
+            commands = case_lines(str(folder), FIRMWARE not in files) if CASE in files else ()
+            return replace(result, left=str(folder), commands=commands)
     except (OSError, BadInput) as error:  # the verdict stands, whatever becomes of its files
         with suppress(OSError, BadInput):
             clear(folder, SCENARIO)

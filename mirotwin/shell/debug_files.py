@@ -2,14 +2,17 @@
 
 from __future__ import annotations
 
+import os
 from collections.abc import Sequence
+from itertools import islice
 from pathlib import Path
-from typing import Annotated
+from pathlib import PureWindowsPath as AnyPath
+from typing import Annotated, NamedTuple
 
 from miro_exact.bad_input import BadInput
 from miro_robot.firmware import source_folder
-from miro_robot.image import Image
-from miro_robot.image.debug_info import Sources
+from miro_robot.image import Image, ImageError
+from miro_robot.image.debug_info import DebugInfo, Sources
 from miro_robot.image.keil_map import project_folders
 from mirotwin.shell.command import Option
 from mirotwin.shell.firmware_image import load_firmware
@@ -87,3 +90,47 @@ def debugged_image(image: Image, images: Sequence[Image], sources: Sequence[str]
     """
     known = next((one for one in images if one.code == image.code), with_debug_files(image))
     return known, source_folders(known, sources)
+
+
+class Place(NamedTuple):
+    """A line of a C file: its path from the current folder if it is there or below, else its name; counted from 1."""
+
+    file: str
+    line: int
+
+    def __str__(self) -> str:
+        return f"{self.file}:{self.line}"
+
+
+class Places:
+    """The C lines of an image's instructions; none without debug files, or with those of another image."""
+
+    def __init__(self, image: Image) -> None:
+        known = with_debug_files(image)
+        self._sources = source_folders(known)
+        try:
+            self._debug = DebugInfo.of(known)
+        except ImageError:
+            self._debug = DebugInfo()
+
+    def at(self, address: int) -> Place | None:
+        line = self._debug.line_at(address)
+        return None if line is None else Place(_from_here(self._sources, line.file), line.line)
+
+
+MOST_FOLDERS = 2000
+"""Folders that are searched for a C file."""
+_SKIPPED = ("build", "node_modules", "__pycache__", "venv")
+
+
+def _from_here(sources: Sources, file: str) -> str:
+    """The path of a file that one of the folders has; else that of the only file of this name below this one."""
+    here, name = Path.cwd(), AnyPath(file).name
+    path = sources.path(file)
+    if path is not None and path.is_relative_to(here):
+        return path.relative_to(here).as_posix()
+    found = []
+    for above, folders, names in islice(os.walk(here), MOST_FOLDERS):
+        folders[:] = sorted(one for one in folders if not one.startswith(".") and one not in _SKIPPED)
+        found += [Path(above, name).relative_to(here).as_posix()] * (name in names)
+    return found[0] if len(found) == 1 else name

@@ -4,17 +4,19 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping, Sequence
-from typing import Any, Literal
+from typing import Any
 from xml.etree import ElementTree
 
 import msgspec
 
 from miro_exact.bad_input import one_line
+from mirotwin.shell.verdicts import VERDICTS, Kind, Verdict
 
 
 class TestCase(msgspec.Struct, frozen=True):
-    """One test. `failure`: what was wanted is not so; `error`: it could not be judged. `lines`: all there is to say;
-    the first one is the message. `time_s` None: nothing about times, so the same verdicts give the same bytes.
+    """One test, rule, run or crash. `counts`: whether its verdict does; one that does not is skipped in JUnit. `lines`:
+    all there is to say; the first one is the message. `time_s` None: nothing about times, so the same verdicts give the
+    same bytes. `facts`: what else there is to know, by names of docs/formats/results.md.
     """
 
     __test__ = False
@@ -22,14 +24,23 @@ class TestCase(msgspec.Struct, frozen=True):
     name: str
     classname: str
     time_s: float | None = None
-    verdict: Literal["passed", "failure", "error", "skipped"] = "passed"
+    verdict: Verdict = "passed"
+    counts: bool = True
     lines: Sequence[str] = ()
-    properties: Mapping[str, str] = {}
+    facts: Mapping[str, str | int | float] = {}
+
+    @property
+    def kind(self) -> Kind:
+        """Its verdict in JUnit's words."""
+        kind = VERDICTS[self.verdict].junit
+        return "skipped" if not self.counts and kind != "passed" else kind
 
 
-def junit_xml(suite: str, cases: Sequence[TestCase], properties: Mapping[str, str] = {}) -> bytes:
+def junit_xml(
+    suite: str, cases: Sequence[TestCase], properties: Mapping[str, str | int | float] = {}
+) -> bytes:
     """The file's content. `properties`: of the whole suite."""
-    verdicts = [case.verdict for case in cases]
+    kinds = [case.kind for case in cases]
     times_s = [case.time_s for case in cases if case.time_s is not None]
     top = ElementTree.Element("testsuites")
     within = ElementTree.SubElement(
@@ -37,9 +48,9 @@ def junit_xml(suite: str, cases: Sequence[TestCase], properties: Mapping[str, st
         "testsuite",
         name=suite,
         tests=str(len(cases)),
-        failures=str(verdicts.count("failure")),
-        errors=str(verdicts.count("error")),
-        skipped=str(verdicts.count("skipped")),
+        failures=str(kinds.count("failure")),
+        errors=str(kinds.count("error")),
+        skipped=str(kinds.count("skipped")),
         **_time(math.fsum(times_s) if times_s else None),
     )
     _properties(within, properties)
@@ -50,11 +61,12 @@ def junit_xml(suite: str, cases: Sequence[TestCase], properties: Mapping[str, st
             classname=one_line(case.classname),
             name=one_line(case.name),
             **_time(case.time_s),
+            **_place(case),
         )
-        _properties(element, case.properties)
-        if case.verdict != "passed":
-            message = one_line(case.lines[0]) if case.lines else case.verdict
-            outcome = ElementTree.SubElement(element, case.verdict, message=message)
+        _properties(element, case.facts)
+        if case.kind != "passed":
+            message = one_line(case.lines[0]) if case.lines else case.kind
+            outcome = ElementTree.SubElement(element, case.kind, message=message)
             outcome.text = "\n".join(map(one_line, case.lines))
         elif case.lines:
             ElementTree.SubElement(element, "system-out").text = "\n".join(map(one_line, case.lines))
@@ -67,8 +79,12 @@ def _time(time_s: float | None) -> dict[str, Any]:
     return {} if time_s is None else {"time": f"{time_s:.3f}"}
 
 
-def _properties(within: ElementTree.Element, properties: Mapping[str, str]) -> None:
+def _place(case: TestCase) -> dict[str, Any]:
+    return {name: one_line(f"{case.facts[name]}") for name in ("file", "line") if name in case.facts}
+
+
+def _properties(within: ElementTree.Element, properties: Mapping[str, str | int | float]) -> None:
     if properties:
         listed = ElementTree.SubElement(within, "properties")
         for name, value in properties.items():
-            ElementTree.SubElement(listed, "property", name=name, value=one_line(value))
+            ElementTree.SubElement(listed, "property", name=name, value=one_line(f"{value}"))

@@ -9,6 +9,8 @@ from collections.abc import Iterable
 from typing import Literal, NamedTuple
 
 Verdict = Literal["error", "differs", "fault", "failed", "not judged", "limit", "passed", "not observable"]
+Kind = Literal["passed", "failure", "error", "skipped"]
+"""A verdict in the words of JUnit."""
 
 
 class VerdictFormat(NamedTuple):
@@ -20,7 +22,7 @@ class VerdictFormat(NamedTuple):
     line: str
     counted: str
     badge: str
-    junit: Literal["passed", "failure", "error", "skipped"]
+    junit: Kind
 
 
 VERDICTS: dict[Verdict, VerdictFormat] = {

@@ -22,6 +22,7 @@ from miro_sim.world.waits import WaitExpired
 from miro_sim.world.world import World
 from mirotwin.runs.result import Result
 from mirotwin.shell.command import shell_line
+from mirotwin.shell.debug_files import Place
 from mirotwin.shell.outputs import RECORDING
 from mirotwin.testing.rig import Rig
 from mirotwin.testing.rig_options import rig_options
@@ -106,16 +107,19 @@ def tell(
         with suppress(BadInput):
             rig.judge()
     result = replace(rig.result(), again=test_line(item, seed))
+    if report.failed:
+        error = None if caught is None else caught.value
+        result = rig.located(error, result)
+        if result.place is None and (crash := getattr(report.longrepr, "reprcrash", None)) is not None:
+            result = replace(result, place=Place(_relative(item.config, Path(crash.path)), crash.lineno))
     facts = {"scenario": rig.spec.scenario.name, **result.facts()}
-    properties = [(f"mirotwin_{key}", value) for key, value in facts.items()]
-    report.user_properties += properties
-    item.user_properties += properties  # JUnit takes them with the report of the teardown
     artifacts = path_option(item.config, "artifacts")
     folder = None if artifacts is None else folder_of(artifacts, item.nodeid)
     if not report.failed:
         with suppress(OSError, BadInput):
             if folder is not None:
                 clear(folder, SUMMARY, RECORDING)
+        _note(item, report, facts)
         return
     failed_at = _failed_at(item, report, caught, result)
     text = story(rig, result, failed_at, [result.again])
@@ -126,6 +130,7 @@ def tell(
         try:
             clear(folder, SUMMARY, RECORDING)
             files, lines = rig.left(None if caught is None else caught.value, where)
+            facts |= dict(zip(("replay", "debug"), lines, strict=False))
             more = story(rig, result, failed_at, [result.again, *lines])
             more += f"\n{report_line(where)}" * bool(files and result.has_page)
             leave(folder, f"{more}\n", {SUMMARY: json.dumps(summary, indent=2).encode() + b"\n", **files})
@@ -135,6 +140,7 @@ def tell(
             with suppress(OSError, BadInput):
                 clear(folder, SUMMARY, RECORDING)
     report.sections.append(("mirotwin", text))
+    _note(item, report, facts)
     if files and folder is not None and item.config.getoption("--mirotwin-pages"):
         from mirotwin.report.report_command import leave_page  # loads readers of recordings
 
@@ -142,6 +148,13 @@ def tell(
             leave_page(folder, item.nodeid)
         except (OSError, ValueError) as error:  # also where Bokeh is missing
             report.sections.append(("mirotwin", f"no page: {error}"))
+
+
+def _note(item: pytest.Item, report: pytest.TestReport, facts: dict[str, str | int | float]) -> None:
+    """Puts the facts into the properties, which JUnit takes with the report of the teardown."""
+    properties: list[tuple[str, object]] = [(f"mirotwin_{key}", value) for key, value in facts.items()]
+    report.user_properties += properties
+    item.user_properties += properties
 
 
 def let_go(item: pytest.Item) -> None:

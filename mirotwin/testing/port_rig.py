@@ -54,6 +54,10 @@ class PortRig:
         reported: list[Line] = [("not observable", line) for line in (*lines, *self.notes)]
         return Result(verdict="passed", said=reported, tick=self.tick)
 
+    def located(self, caught: BaseException | None, result: Result) -> Result:
+        """No port shows which C line a robot executes."""
+        return result
+
     def head(self) -> list[str]:
         return [f"scenario {self.spec.scenario.name}, {at(self.tick)}", f"robots at {self.desk.port}"]
 

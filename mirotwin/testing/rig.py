@@ -8,6 +8,7 @@ from miro_sim.scenario.board import BoardScenario
 from miro_sim.world.events import BoardLog, HostLog
 from miro_sim.world.machine import Machine
 from miro_sim.world.world import World
+from mirotwin.runs.failure_place import located
 from mirotwin.runs.result import Result
 from mirotwin.runs.run import Run
 from mirotwin.shell.firmware_image import BOOT_PERIODS, is_up, not_up
@@ -87,12 +88,23 @@ class Rig:
 
         `where`: the folder as commands name it.
         """
-        if any(device.written for device in (*self.robots, *filter(None, [self.board]))):
+        if self.written:
             return {}, []
         case = self._case(caught)
         own = foreign_path(self.world.image) is None
         lines = [] if case is None else case_lines(where, own)
         return stream_files(case, self.run.stream(), self.world.image), [*lines]
+
+    @property
+    def written(self) -> bool:
+        """Whether the test wrote into a memory by itself: then nobody can run it again."""
+        return any(device.written for device in (*self.robots, *filter(None, [self.board])))
+
+    def located(self, caught: BaseException | None, result: Result) -> Result:
+        """The result with the C line at which the debugger stands at the check, or the wait, that failed."""
+        if isinstance(caught, WaitFailed):
+            result = msgspec.structs.replace(result, step_tick=self.tick)
+        return result if self.written else located(self.run, result)
 
     def _case(self, caught: BaseException | None) -> str | None:
         if isinstance(caught, WaitFailed) and caught.expect is not None:

@@ -12,13 +12,14 @@ from miro_exact.bad_input import BadInput, amount
 from mirotwin.runs.result import Result
 from mirotwin.runs.test_file import KINDS, collect, stem_of
 from mirotwin.shell.command import command_of
-from mirotwin.shell.junit import TestCase, junit_xml
-from mirotwin.shell.outputs import check_file, whole_file
+from mirotwin.shell.junit import TestCase
+from mirotwin.shell.outputs import check_file
 from mirotwin.shell.program import show_line, show_traceback, tell_notes
-from mirotwin.shell.verdicts import VERDICTS, exit_code
+from mirotwin.shell.results import Results
+from mirotwin.shell.verdicts import VERDICTS, judge
 from mirotwin.testing.test_files import run_file
 from mirotwin.testing.test_options import TestOptions
-from mirotwin.verify.cases.artifacts import CASE, FIRMWARE, case_lines, report_line
+from mirotwin.verify.cases.artifacts import report_line
 from mirotwin.verify.cases.case import SUFFIX as CASE_SUFFIX
 from mirotwin.verify.checks.interface import in_ms
 from mirotwin.verify.expectations import as_settings, in_files
@@ -80,19 +81,22 @@ def test(options: TestOptions) -> int:
         results.append(result)
         tell_notes(note for note in result.left_out if note not in left_out)
         left_out |= dict.fromkeys(result.left_out)
-        _show(result, options)
+        if not options.as_json:
+            _show(result, options)
         if options.pages and result.left and result.has_page:
             try:
                 leave_page(Path(result.left))
             except (OSError, BadInput) as error:
                 show_line(f"    no page: {error}")
-    code = _summary(results)
-    if junit is not None:  # the verdicts are printed first, whatever becomes of their file
-        with whole_file(junit, "--junit") as part:
-            part.write_bytes(junit_xml("mirotwin", cases))
+    reported = Results(command="test", cases=cases, verdict=judge(one.verdict for one in results))
+    if options.as_json:
+        reported.print_json()
+    else:
+        show_line(_summary(results))
+    reported.write_junit(junit)  # the verdicts are printed first, whatever becomes of their file
     if all(file.endswith(CASE_SUFFIX) for file in chosen):
         _refuse_unused(in_files(options.expected).values(), results)
-    return code
+    return VERDICTS[reported.verdict].code
 
 
 def _refuse_unused(files: Iterable[str], results: Sequence[Result]) -> None:
@@ -115,11 +119,8 @@ def _show(result: Result, options: TestOptions) -> None:
         show_line(f"    {line}")
     if result.left:
         show_line(f"    left in {result.left}")
-        case = Path(result.left) / CASE
-        if case.exists():
-            own = not case.with_name(FIRMWARE).exists()
-            for line in case_lines(result.left, own):
-                show_line(f"    {line}")
+        for line in result.commands:
+            show_line(f"    {line}")
         if result.has_page:
             show_line(f"    {report_line(result.left)}")
     if not passed and result.verdict != "error":
@@ -128,23 +129,16 @@ def _show(result: Result, options: TestOptions) -> None:
         show_line(f"    {result.again}")
 
 
-def _summary(results: Sequence[Result]) -> int:
-    """Prints what came of all; returns the exit code."""
+def _summary(results: Sequence[Result]) -> str:
+    """What came of all."""
     counted = Counter(one.verdict for one in results)
     reported = [verdict for verdict in VERDICTS if counted[verdict]]
     text = ", ".join(f"{counted[verdict]} {VERDICTS[verdict].counted}" for verdict in reported)
     if unseen := sum(one.unseen for one in results):
         text += f"; {amount(unseen, 'step or expectation is', 'steps and expectations are')} not observable on a port"
-    show_line(text)
-    return exit_code(*counted)
+    return text
 
 
 def _test_case(result: Result, time_s: float) -> TestCase:
-    return TestCase(
-        name=stem_of(result.path),
-        classname=str(Path(result.path).parent).strip("./").replace("/", ".") or "scenario",
-        time_s=time_s,
-        verdict=VERDICTS[result.verdict].junit,
-        lines=(*result.lines, *result.notes),
-        properties=result.facts(),
-    )
+    classname = str(Path(result.path).parent).strip("./").replace("/", ".") or "scenario"
+    return result.as_case(stem_of(result.path), classname, time_s)

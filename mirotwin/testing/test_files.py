@@ -14,13 +14,14 @@ from msgspec.structs import replace
 
 from miro_exact.bad_input import BadInput
 from miro_robot.image import SPACE_BYTES
+from mirotwin.runs.failure_place import located_in
 from mirotwin.runs.job import load_stream
 from mirotwin.runs.result import Line, Result
 from mirotwin.runs.test_file import cannot_be_run, run_test
 from mirotwin.shell.firmware_image import load_firmware
 from mirotwin.testing.test_options import TestOptions
 from mirotwin.verify.cases.case import SUFFIX as CASE_SUFFIX
-from mirotwin.verify.cases.replay_line import replay_line
+from mirotwin.verify.cases.replay_line import debug_line, replay_line
 from mirotwin.verify.expectations import as_settings, in_files
 
 
@@ -50,10 +51,14 @@ def _run_case(options: TestOptions, path: str) -> Result:
         job = load_stream(path, options.firmware)
         own_files = in_files(options.expected)
         expected = [own_files[name] for name in job.spec.scenario.expect if name in own_files]
-        result = _as_test(path, job.judge_case())
+        result = located_in(job.spec, _as_test(path, job.judge_case()))
     except BadInput as error:
         result = cannot_be_run(path, error)
-    return replace(result, again=replay_line(path, options.firmware, tuple(expected), options.plugins))
+    again, at_failure = (
+        line(path, options.firmware, expected=tuple(expected), plugins=options.plugins)
+        for line in (replay_line, debug_line)
+    )
+    return replace(result, again=again, commands=(again, at_failure) if result.failures else ())
 
 
 def _as_test(path: str, result: Result) -> Result:

@@ -7,7 +7,7 @@ from typing import Annotated
 
 from mirotwin.desk.guard import DeskOptions
 from mirotwin.shell.command import Argument, Option, Options
-from mirotwin.shell.options import ARTIFACTS, JUNIT, NAME, QUIET, SET, Engine, Firmware, Seed
+from mirotwin.shell.options import ARTIFACTS, JSON, JUNIT, NAME, QUIET, SET, Engine, Firmware, Seed
 from mirotwin.shell.plugin_files import PluginFiles
 from mirotwin.verify.cases.replay_line import DebugLineOptions
 from mirotwin.verify.expectations import Expected
@@ -26,6 +26,7 @@ class TestOptions(Options, frozen=True, kw_only=True):
     firmware: Firmware = None
     plugins: PluginFiles = PluginFiles()
     engine: Engine = None
+    as_json: Annotated[bool, JSON.saying("Print one JSON document instead of lines.")] = False
     junit: Annotated[Path | None, JUNIT.saying("Write the verdicts as JUnit XML, too.")] = None
     artifacts: Annotated[
         Path | None,

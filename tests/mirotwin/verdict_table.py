@@ -128,7 +128,7 @@ def said(kind, command, *words, **more):
 
 
 def failure_in(kind, text):
-    found = re.search(KINDS[kind], text.replace('"wanted":"', "wanted "))
+    found = re.search(KINDS[kind], text)
     assert found, f"{kind}: nothing like {KINDS[kind]!r} in:\n{text}"
     return found[0]
 

@@ -7,10 +7,11 @@ from xml.etree import ElementTree
 import pytest
 
 from mirotwin.conform.rules import ALL, RULES
+from mirotwin.shell.firmware_image import load_firmware
 from tests.mirotwin.conform.images import BABBLES, FAULTS, HANGS, POKES, PUSHES, READS_BOTH, RUNS_OUT
 from tests.mirotwin.conform.mistakes import MISTAKES
 from tests.mirotwin.conftest import hex_file
-from tests.mirotwin.verify.checks.rig import built_in, needs_sdcc
+from tests.mirotwin.verify.checks.rig import built_in, needs_sdcc, planted
 
 
 def program(folder, code):
@@ -90,18 +91,29 @@ def test_a_program_that_babbles_breaks_the_rule_of_silence_first(mirotwin, tmp_p
     assert "55 .. (ticks 157239" in out
 
 
-def test_json_is_a_line_a_rule(mirotwin, tmp_path):
+def test_json_is_one_document_with_a_case_a_rule(mirotwin, tmp_path):
     image = program(tmp_path, HANGS)
     code, out, _ = mirotwin("conform", image, "--json", "--rule", "P03", "--rule", "P43")
     assert code == 1
-    lines = [json.loads(line) for line in out.splitlines()]
-    assert [(line["rule"], line["verdict"], line["cause"], line["faults"]) for line in lines] == [
-        ("P03", "failed", None, 0),
-        ("P43", "not judged", "P03", 0),
+    document = json.loads(out)
+    cases = document.pop("cases")
+    assert document == {
+        "format": "mirotwin results",
+        "version": 1,
+        "command": "conform",
+        "verdict": "failed",
+        "exit_code": 1,
+        "firmware": "program.ihx",
+        "firmware_sha256": load_firmware(f"{image}").sha256,
+        "seed": 0,
+    }
+    assert [(one["rule"], one["verdict"], one["counts"], one.get("cause")) for one in cases] == [
+        ("P03", "failed", True, None),
+        ("P43", "not judged", False, "P03"),
     ]
-    first = lines[0]["first"]
-    assert first["wanted"] == "the velocities of team frame, seq 1 at the wheels within 10 ms"
-    assert list(first) == ["check", "network", "slot", "tick", "wanted", "found", "fault"]
+    assert cases[0]["wanted"] == "the velocities of team frame, seq 1 at the wheels within 10 ms"
+    assert cases[0]["reproduce"] == f"mirotwin conform {image} --rule P03"
+    assert (cases[0]["slot"], cases[0]["at_ms"] > 40.0, "file" in cases[0]) == (1, True, False)
 
 
 def test_junit_has_a_case_a_rule_and_the_same_bytes_every_time(mirotwin, tmp_path):
@@ -122,8 +134,34 @@ def test_junit_has_a_case_a_rule_and_the_same_bytes_every_time(mirotwin, tmp_pat
     assert "wanted the velocities of" in str(failure.get("message"))
     skipped = cases[1].find("skipped")
     assert skipped.get("message") == "not judged: P03 failed, it is not ready 40 ms after power-on"
-    names = [one.get("name") for one in suite.iter("property")]
+    names = [one.get("name") for one in suite.findall("properties/property")]
     assert names == ["firmware", "firmware_sha256", "seed"]
+
+
+def test_a_failure_has_the_c_line_at_which_the_debugger_stands(mirotwin, tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    mirotwin.succeeds("examples", "firmware")
+    options = ("--rule", "P18", "--artifacts", "failed", "--junit", "j.xml", "--json")
+    _, out, _ = mirotwin("conform", "late.ihx", *options)
+    (case,) = json.loads(out)["cases"]
+    (element,) = ElementTree.parse("j.xml").iter("testcase")
+    assert (element.get("file"), element.get("line")) == (case["file"], str(case["line"]))
+    _, out, _ = mirotwin(*case["debug"].split()[1:], "-x", "where")
+    assert f"{case['file']}:{case['line']} in " in next(
+        line for line in out.splitlines() if line.startswith("*#0")
+    )
+
+
+@needs_sdcc
+def test_a_firmware_fault_has_the_c_line_of_its_instruction_and_the_case_of_its_trial(mirotwin, tmp_path):
+    image = planted("pushes for ever").path
+    options = ("--rule", "P52", "--rule", "P53", "--artifacts", tmp_path / "failed", "--json")
+    code, out, _ = mirotwin("conform", image, *options)
+    document = json.loads(out)
+    assert (code, document["verdict"]) == (3, "fault")
+    fault = document["cases"][1]
+    assert (fault["rule"], fault["file"], fault["line"]) == ("P53", "robot_fw/firmware/main.c", 49)
+    assert f"{tmp_path / 'failed' / 'P52-fault.stream'}" in fault["replay"]
 
 
 def test_all_rules_are_listed_and_none_is_tried(mirotwin):

@@ -68,13 +68,10 @@ def tried(folder, robot, times, rules):
             if code not in (0, 1):
                 print(err.strip())
                 return False
-            for line in map(json.loads, found.splitlines()):
-                verdicts[line["verdict"]] += 1
-                if line["verdict"] in ("failed", "not judged"):
-                    print(
-                        f"{number}: {line['rule']} {line['verdict']}: {line['why'] or line['first']}",
-                        flush=True,
-                    )
+            for case in json.loads(found)["cases"]:
+                verdicts[case["verdict"]] += 1
+                if case["verdict"] in ("failed", "not judged"):
+                    print(f"{number}: {case['rule']} {case['verdict']}: {case['lines'][0]}", flush=True)
         session.stop()
     print(f"{times} times: {dict(verdicts)}")
     return not verdicts["failed"]

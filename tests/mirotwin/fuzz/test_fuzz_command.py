@@ -4,6 +4,7 @@ import json
 import re
 import signal
 import sys
+from xml.etree import ElementTree
 
 import pytest
 
@@ -45,6 +46,27 @@ def test_a_planted_mistake_is_found_and_the_printed_line_gives_it_again(mirotwin
     assert any(crash["confirmed"] for crash in summary["crashes"])
     assert (tmp_path / "out" / "coverage.info").read_text().startswith("TN:\nSF:")
     assert list((tmp_path / "out" / "corpus").iterdir())
+
+
+@needs_sdcc
+def test_json_and_junit_have_a_case_for_the_campaign_and_one_for_each_crash(mirotwin, engines, tmp_path):
+    image = planted("takes frames with a bad CRC").path
+    options = ("--minimise", "0.3s", "--out", tmp_path / "out", "--json", "--junit", tmp_path / "j.xml", "-q")
+    code, out, _ = mirotwin("fuzz", image, "--time", "3s", *options)
+    document = json.loads(out)
+    assert (code, document["verdict"], document["exit_code"]) == (1, "failed", 1)
+    campaign, crash = document["cases"][:2]
+    assert (campaign["name"], campaign["verdict"]) == ("campaign", "passed")
+    assert (crash["verdict"], crash["counts"]) == ("failed", True)
+    again, _, said = mirotwin(*crash["replay"].split()[1:])
+    assert (again, said.partition(" (")[0]) == (
+        1,
+        f"mirotwin: fails as recorded: {crash['lines'][0]}".partition(" (")[0],
+    )
+    written = json.loads((tmp_path / "out" / "summary.json").read_text())
+    assert document["summary"] == written
+    names = [case.get("name") for case in ElementTree.parse(tmp_path / "j.xml").iter("testcase")]
+    assert names == [case["name"] for case in document["cases"]]
 
 
 @pytest.mark.parametrize("kind", ["frames", "session"])

@@ -4,6 +4,7 @@ import json
 import subprocess
 import sys
 from pathlib import Path
+from xml.etree import ElementTree
 
 import pytest
 from PIL import Image
@@ -32,6 +33,21 @@ def test_a_run_writes_a_recording_a_figure_and_a_summary(finished):
     assert recording.source.firmware == image_path().read_bytes()
     assert recording.source.firmware_sha256 == summary["firmware"]["sha256"]
     assert [(one["network"], one["slot"]) for one in summary["robots"]] == [(0, 0), (0, 2)]
+
+
+def test_json_and_junit_have_the_run_as_a_case_with_the_place_of_its_failure(mirotwin, tmp_path):
+    words = ("--set", "duration_s=0.5", "--expect", "settles_within_s=0.1", "--out", tmp_path / "out", "-q")
+    code, out, _ = mirotwin("run", "fig6", *words, "--json", "--junit", tmp_path / "j.xml")
+    document = json.loads(out)
+    (case,) = document["cases"]
+    assert (code, document["verdict"], case["verdict"], case["at_ms"]) == (1, "failed", "failed", 100.1)
+    assert document["summary"] == json.loads((tmp_path / "out" / "summary.json").read_text())
+    (element,) = ElementTree.parse(tmp_path / "j.xml").iter("testcase")
+    assert (element.get("file"), element.get("line")) == (case["file"], str(case["line"]))
+    _, out, _ = mirotwin("debug", tmp_path / "out", "--at", f"{case['tick']}t", "-x", "where")
+    assert f" {Path(case['file']).name}:{case['line']} in " in out.splitlines()[-1]
+    code, out, _ = mirotwin(*case["reproduce"].split()[1:], "--out", tmp_path / "again", "-q")
+    assert code == 1
 
 
 def test_recording_changes_nothing_and_leaves_nothing_out(finished, short):

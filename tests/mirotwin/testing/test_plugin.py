@@ -110,6 +110,21 @@ def test_junit_has_the_facts_of_each_run_and_the_line_that_repeats_it(mixed):
         "pytest 'test_mine.py::test_is_judged[1]' --mirotwin-seed 4"
     )
     assert named["test_needs_no_world"] == {}
+    asserts = named["test_asserts"]
+    assert (asserts["mirotwin_file"], "mirotwin_at_ms" in asserts) == ("test_mine.py", False)
+    assert (mixed / "test_mine.py").read_text().splitlines()[int(asserts["mirotwin_line"]) - 1].split()[
+        0
+    ] == "assert"
+
+
+@pytest.mark.parametrize("name", ["test_waits_in_vain", "test_is_judged[1]"])
+def test_junit_has_the_c_line_at_which_the_debugger_stands(mixed, name):
+    (case,) = [
+        one for one in ElementTree.parse(mixed / "junit.xml").iter("testcase") if one.get("name") == name
+    ]
+    facts = {one.get("name"): one.get("value") for one in case.iter("property")}
+    done = run(mixed, f"{facts['mirotwin_debug']} -x where")
+    assert f"*#0  {facts['mirotwin_file']}:{facts['mirotwin_line']} in " in done.stdout
 
 
 def test_a_failed_test_leaves_a_folder_of_its_own_and_a_passing_one_nothing(mixed):
@@ -118,7 +133,7 @@ def test_a_failed_test_leaves_a_folder_of_its_own_and_a_passing_one_nothing(mixe
     assert not [name for name in folders if "passes" in name or "needs_no" in name]
     (judged,) = [path for path in (mixed / "left").iterdir() if "is_judged" in path.name]
     summary = json.loads((judged / "summary.json").read_text())
-    assert summary["seed"] == "4"
+    assert (summary["seed"], summary["file"]) == (4, "main.c")
     assert summary["failed"][0].startswith("expectation failed: frames_accepted_min: net0/robot0")
     report = (judged / "report.txt").read_text()
     assert "sent 23 characters" in report
@@ -386,7 +401,8 @@ def test_each_file_is_a_test_and_a_failure_is_its_line_without_a_traceback(scena
     assert ".py:" not in done.stdout
     (suite,) = ElementTree.parse(scenarios / "out.xml").getroot()
     names = {one.get("name") for one in suite.iter("property")}
-    assert names == {"mirotwin_seed", "mirotwin_digest", "mirotwin_firmware_sha256", "mirotwin_reproduce"}
+    facts = {"seed", "digest", "firmware_sha256", "reproduce", "tick", "at_ms", "file", "line"}
+    assert names == {f"mirotwin_{name}" for name in facts}
 
 
 @pytest.mark.slow

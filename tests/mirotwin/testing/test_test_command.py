@@ -1,5 +1,6 @@
 """`mirotwin test`: which files are tests, their verdicts, what a failure leaves, and saved failures run again."""
 
+import json
 import os
 from pathlib import Path
 from xml.etree import ElementTree
@@ -111,6 +112,35 @@ def test_files_are_collected_once_in_the_order_of_their_paths(folder):
     hidden.mkdir()
     (hidden / "x.scenario.toml").write_text(GOOD)
     assert collect(["hil"]) == names
+
+
+def test_json_is_one_document_with_a_case_a_file(mirotwin, folder):
+    code, out, err = mirotwin("test", "hil", "--json", "--artifacts", "left")
+    document = json.loads(out)
+    assert (code, err, document["verdict"], document["exit_code"]) == (2, "", "error", 2)
+    cases = {case["name"]: case for case in document["cases"]}
+    assert [(name, case["verdict"]) for name, case in cases.items()] == [
+        ("a", "passed"),
+        ("b", "failed"),
+        ("c", "error"),
+        ("d", "failed"),
+        ("e", "failed"),
+    ]
+    assert cases["c"]["lines"][0].endswith("unknown key; use within_ms, in milliseconds")
+    assert (cases["b"]["tick"], cases["b"]["at_ms"]) == (600000, 25.0)
+    assert cases["b"]["replay"] == "mirotwin replay left/hil-sub-b/case.stream"
+
+
+@pytest.mark.parametrize("name", ["b", "d"])
+def test_a_failure_has_the_c_line_at_which_the_debugger_stands(mirotwin, folder, name):
+    _, out, _ = mirotwin("test", f"hil/sub/{name}.scenario.toml", "--json", "--artifacts", "left")
+    (case,) = json.loads(out)["cases"]
+    _, out, _ = mirotwin(*case["debug"].split()[1:], "-x", "where")
+    stands = next(line for line in out.splitlines() if line.startswith("*#0"))
+    assert f" {case['file']}:{case['line']} in " in stands
+    _, out, _ = mirotwin("test", "left", "--json")
+    (again,) = json.loads(out)["cases"]
+    assert (again["tick"], again["file"], again["line"]) == (case["tick"], case["file"], case["line"])
 
 
 def test_junit_has_each_test_with_what_gives_it_again(mirotwin, folder):
