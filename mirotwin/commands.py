@@ -90,6 +90,7 @@ SECTIONS = {
         "init": Lazy("testing.starter", "Begins a project: firmware, tests, scenarios, a workflow for CI."),
         "examples": Lazy("testing.starter", "Lists the examples, or writes one into a folder."),
         "test": Lazy("testing.test_command", "Runs scenario files and cases as tests, a verdict each."),
+        "summary": Lazy("testing.summary_command", "Makes a page of JUnit reports, for CI."),
         "conform": Lazy("conform.conform_command", "Tries the protocol's rules on a firmware image."),
         "debug": Lazy("debug.debug_command", "Steps through the firmware, forwards and backwards."),
         "fuzz": Lazy("fuzz.fuzz_command", "Looks for inputs that make a firmware image fail."),

@@ -4,12 +4,14 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping, Sequence
+from pathlib import Path
 from typing import Any
 from xml.etree import ElementTree
 
 import msgspec
 
-from miro_exact.bad_input import one_line
+from miro_exact.bad_input import BadInput, one_line
+from miro_exact.inputs import read_input
 from mirotwin.shell.verdicts import VERDICTS, Kind, Verdict
 
 
@@ -88,3 +90,46 @@ def _properties(within: ElementTree.Element, properties: Mapping[str, str | int 
         listed = ElementTree.SubElement(within, "properties")
         for name, value in properties.items():
             ElementTree.SubElement(listed, "property", name=name, value=one_line(f"{value}"))
+
+
+class ReadCase(msgspec.Struct, frozen=True):
+    """A test of a JUnit file, of ours or of another tool. `facts`: its properties; pytest's without `mirotwin_`."""
+
+    name: str
+    kind: Kind
+    message: str
+    facts: Mapping[str, str]
+
+    @property
+    def place(self) -> str:
+        """FILE:LINE, or what of it is known."""
+        return ":".join(self.facts[name] for name in ("file", "line") if self.facts.get(name))
+
+
+_KINDS: tuple[Kind, ...] = ("failure", "error", "skipped")
+
+
+def read_junit(path: Path) -> list[ReadCase] | None:
+    """The tests of a file; None for XML that is no JUnit. Raises BadInput."""
+    try:
+        top = ElementTree.fromstring(read_input(path))
+    except ElementTree.ParseError as error:
+        raise BadInput(path, error.position[0], "is no XML that is whole", "write it again") from None
+    except OSError as error:
+        raise BadInput(path, "", error.strerror or f"{error}", "name another file") from None
+    if top.tag not in ("testsuites", "testsuite"):
+        return None
+    return [_read_case(element) for element in top.iter("testcase")]
+
+
+def _read_case(element: ElementTree.Element) -> ReadCase:
+    name = one_line(element.get("name", ""))
+    facts = {key: one_line(element.get(key, "")) for key in ("file", "line") if element.get(key)}
+    for one in element.iter("property"):
+        facts[one.get("name", "").removeprefix("mirotwin_")] = one_line(one.get("value", ""))
+    kind = next((kind for kind in _KINDS if element.find(kind) is not None), None)
+    outcome = None if kind is None else element.find(kind)
+    if kind is None or outcome is None:
+        return ReadCase(name, "passed", "", facts)
+    lines = (outcome.get("message") or outcome.text or "").strip().splitlines()
+    return ReadCase(name, kind, one_line(lines[0]) if lines else kind, facts)

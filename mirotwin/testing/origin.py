@@ -72,9 +72,10 @@ def installed(project: Path) -> str | None:
 
 
 def _of_path(path: Path, project: Path) -> str:
-    """A path within the project is relative to it, so that it holds on every machine."""
+    """A path within the project, or beside it, is relative to it, so that it holds on every machine."""
     path, project = path.resolve(), project.resolve()
-    inner = path.relative_to(project).as_posix() if path.is_relative_to(project) else ""
-    if _PLAIN.fullmatch(inner):
-        return f"./{inner}{PACKAGE.removeprefix('mirotwin')}"
+    for above, start in (project, "./"), (project.parent, "../"):
+        inner = path.relative_to(above).as_posix() if path.is_relative_to(above) else ""
+        if _PLAIN.fullmatch(inner) and (start == "./" or path.parent == above):
+            return f"{start}{inner}{PACKAGE.removeprefix('mirotwin')}"
     return f"{PACKAGE} @ {path.as_uri()}"

@@ -83,6 +83,8 @@ def _images() -> Iterator[tuple[str, Path]]:
 
 FIRMWARE = "firmware"
 REQUIREMENTS, README = "requirements.txt", "README.md"
+OF_CI = (".git", "ci.sh", "Dockerfile", REQUIREMENTS)
+"""How the names of those files of the project begin that a project of a board has, too."""
 OF_FIRMWARE = "tests/test_firmware.py"
 """What only this firmware passes, because it names a function of it."""
 
@@ -111,7 +113,7 @@ def board_files(board: str) -> Iterator[tuple[str, Path]]:
         raise BadInput("", "--board", f"no such board {shortened(repr(board))}", hint)
     files = [(path.relative_to(boards / board).as_posix(), path) for path in all_files(boards / board)]
     of_any = [(path.relative_to(of_project).as_posix(), path) for path in all_files(of_project)]
-    files += [file for file in of_any if file[0].startswith((".git", REQUIREMENTS))]
+    files += [file for file in of_any if file[0].startswith(OF_CI)]
     yield from sorted([*files, (README, boards / README)])
 
 
@@ -211,15 +213,16 @@ class InitOptions(Options, frozen=True, kw_only=True):
 def init(options: InitOptions) -> None:
     """Writes a sample project into FOLDER, which is new or has no files of these names.
 
-    It holds a working firmware in C with a Makefile, a scenario with expectations, a pytest test, and a workflow that
-    runs them with `mirotwin conform` at each push. With --without-firmware the project tests a controller or
-    a protocol and needs no C compiler. `make test IMAGE=mine.ihx` then tries an image of yours.
+    It holds a working firmware in C with a Makefile, a scenario with expectations, a pytest test, and ci.sh, which runs
+    them with `mirotwin conform` in any CI; a workflow for GitHub calls it. With --without-firmware the project tests a
+    controller or a protocol and needs no C compiler. `make test IMAGE=mine.ihx` then tries an image of yours.
 
     With --board car the project is an 8051 board of parts: board file, firmware in C and its image, scenarios, a pytest
     test.
 
-    requirements.txt says where the workflow gets Mirotwin: SOURCE, else the git commit, wheel or checkout that the
-    installed one came from. Where neither is known, it says what to write there, and the workflow fails with that.
+    requirements.txt says where CI gets Mirotwin: SOURCE, else the git commit, wheel or checkout that the installed one
+    came from; one in the project, or beside it, by its relative path. Where neither is known, it says what to write
+    there, and CI fails with that.
     """
     folder, remedy = options.folder, "name a folder that is new or empty"
     found = board_files(options.board) if options.board else project_files(not options.without_firmware)
@@ -236,6 +239,10 @@ def init(options: InitOptions) -> None:
     if line is not None and "@ file:" in line:
         click.echo(
             "That is a path of this machine. For CI on another one begin with --from git+https://HOST/PATH@COMMIT"
+        )
+    if line is not None and line.startswith("../"):
+        click.echo(
+            "CI needs it there, too, beside the project. Or begin with --from git+https://HOST/PATH@COMMIT"
         )
     enter = shell_line("cd", operand(folder))
     if options.board:

@@ -53,7 +53,7 @@ class Clean:
     def copy_engines(self):
         """Puts the compiled modules of this tree into what was installed."""
         where = "import sysconfig; print(sysconfig.get_path('platlib'))"
-        target = Path(self.must("python", "-c", where).strip())
+        target = Path(self.must(self.bin / "python", "-c", where).strip())
         for package in (*PACKAGE_FOLDERS, "mirotwin"):
             base = ROOT if package == "mirotwin" else ROOT / package
             for path in (one for pattern in ENGINES for one in (ROOT / package).rglob(pattern)):

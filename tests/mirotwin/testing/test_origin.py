@@ -99,6 +99,15 @@ def test_a_wheel_within_the_project_is_relative_to_it(tmp_path, monkeypatch):
     assert line == "./wheels/mirotwin-0.3.0-py3-none-any.whl[report]"
 
 
+def test_a_checkout_beside_the_project_is_relative_to_it_and_one_elsewhere_is_not(tmp_path):
+    for name in ("mirotwin", "other/mirotwin"):
+        (tmp_path / name).mkdir(parents=True)
+        (tmp_path / name / "pyproject.toml").write_text("")
+    assert origin.given(f"{tmp_path / 'mirotwin'}", tmp_path / "mine") == "../mirotwin[report]"
+    elsewhere = tmp_path / "other" / "mirotwin"
+    assert origin.given(f"{elsewhere}", tmp_path / "mine") == f"mirotwin[report] @ {elsewhere.as_uri()}"
+
+
 def test_a_checkout_is_a_source_and_any_other_folder_is_none(tmp_path):
     with pytest.raises(BadInput, match="--from: is no wheel, no source archive and no checkout; give git"):
         origin.given(str(tmp_path), tmp_path / "mine")
@@ -118,5 +127,5 @@ def test_whatever_is_given_is_one_line_with_an_address_or_refused(tmp_path_facto
     except BadInput:
         return
     assert line.isprintable()
-    assert line.startswith(("mirotwin[report] @ ", "./"))
+    assert line.startswith(("mirotwin[report] @ ", "./", "../"))
     assert line.isascii()

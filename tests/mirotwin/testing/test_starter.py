@@ -276,6 +276,8 @@ def test_a_project_of_a_board_passes_its_tests_with_pytest_alone(mirotwin, tmp_p
         "requirements.txt",
         ".gitignore",
         ".github/workflows/firmware.yml",
+        "ci.sh",
+        "Dockerfile",
     } <= found
     assert f"next: cd {tmp_path}/mine && pytest" in out
     scenarios = len(list((tmp_path / "mine").glob("*.scenario.toml")))
