@@ -2,9 +2,9 @@
 
 It is begun outside of any checkout, by an installed wheel, pushed to a bare repository, cloned, and tested by its own
 ci.sh on a machine that has git, Python, a C compiler, make, SDCC, and an empty home. The firmware as it is has to be
-green; with a mistake it has to be red, and leave reports, cases and a summary. Then the steps of action.yml test another
-project. Compiling takes minutes; with `--smoke` the wheel is built without, and what is installed gets the compiled
-modules of this tree.
+green; with a mistake it has to be red, and leave reports, cases and a summary. Then the steps of action.yml test a
+project without firmware. Compiling takes minutes; with `--smoke` the wheel is built without, and what is installed gets
+the compiled modules of this tree.
 """
 
 import argparse
