@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import os
 import re
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from pathlib import Path
@@ -125,6 +126,10 @@ def annotation(case: ReadCase) -> str:
     here = bool(file) and not Path(file).is_absolute() and Path(file).is_file()
     if place and not here:
         message = f"{place}: {message}"
+    if here and (
+        top := os.environ.get("GITHUB_WORKSPACE")
+    ):  # a project may lie below the top of its repository
+        file = os.path.relpath(file, top).replace(os.sep, "/")
     properties = {"file": file, "line": case.facts.get("line", "")} if here else {}
     named = [
         f"{key}={_escaped(value, ':,')}"

@@ -69,13 +69,17 @@ def test_many_failures_are_counted_not_listed(tmp_path):
     assert "5 more are in the reports." in lines
 
 
-def test_an_annotation_names_the_line_of_a_file_of_the_project(mirotwin, reports):
+def test_an_annotation_names_the_line_of_a_file_of_the_project(mirotwin, reports, monkeypatch):
     out = mirotwin.succeeds("summary", "build", "--annotations", "--out", "s.md")
     assert out == "::error title=P29 stop::firmware/main.c:60: found | left\n"
     Path("firmware").mkdir()
     Path("firmware/main.c").write_text("")
+    monkeypatch.delenv("GITHUB_WORKSPACE", raising=False)
     out = mirotwin.succeeds("summary", "build", "--annotations", "--out", "s.md")
     assert out == "::error file=firmware/main.c,line=60,title=P29 stop::found | left\n"
+    monkeypatch.setenv("GITHUB_WORKSPACE", f"{Path.cwd().parent}")
+    out = mirotwin.succeeds("summary", "build", "--annotations", "--out", "s.md")
+    assert f"file={Path.cwd().name}/firmware/main.c,line=60," in out
 
 
 @pytest.mark.parametrize("content", [None, b"<coverage/>", junit_xml("mirotwin", [])])
