@@ -14,7 +14,7 @@ from mirotwin.runs.test_file import KINDS, collect, stem_of
 from mirotwin.shell.command import command_of
 from mirotwin.shell.junit import TestCase
 from mirotwin.shell.outputs import check_file
-from mirotwin.shell.program import show_line, show_traceback, tell_notes
+from mirotwin.shell.program import complain, show_line, show_traceback, tell_notes
 from mirotwin.shell.results import Results
 from mirotwin.shell.verdicts import VERDICTS, judge
 from mirotwin.testing.test_files import run_file
@@ -87,7 +87,7 @@ def test(options: TestOptions) -> int:
             try:
                 leave_page(Path(result.left))
             except (OSError, BadInput) as error:
-                show_line(f"    no page: {error}")
+                (complain if options.as_json else show_line)(f"    no page: {error}")
     reported = Results(command="test", cases=cases, verdict=judge(one.verdict for one in results))
     if options.as_json:
         reported.print_json()
