@@ -10,6 +10,7 @@ from collections.abc import Iterator, Sequence
 from itertools import pairwise
 from typing import NamedTuple
 
+from miro_exact.bad_input import amount
 from miro_exact.inputs import InputError
 from mirotwin.recording.capture.pieces import Facts, Piece, direction_in
 
@@ -87,6 +88,7 @@ def read(lines: Iterator[str], facts: Facts, base: int) -> Iterator[Piece]:
     """The bytes of a dump; the offset of the next line says how many of a line are meant, and what `*` stands for."""
     held: _Row | None = None
     repeats = False
+    missing = first_gap = 0
     for number, line in enumerate(lines, 1):
         if line.strip() == "*":
             repeats = held is not None
@@ -101,10 +103,16 @@ def read(lines: Iterator[str], facts: Facts, base: int) -> Iterator[Piece]:
                 count = int(row.offset, base) - int(held.offset, base)
             except ValueError:
                 count = len(held.data)
+            if held.data and not repeats and count > len(held.data):
+                missing += count - len(held.data)
+                first_gap = first_gap or number
             yield from _held_pieces(held.data, count, repeats, facts.label, number)
         held, repeats = row, False
     if held is not None and held.data:
         yield Piece(None, "", held.data)
+    if missing:
+        reason = f"by the offsets {amount(missing, 'character')} missing, first before line {first_gap}"
+        facts.tell(f"{facts.label}: {reason}; copy the whole dump")
 
 
 def _held_pieces(data: bytes, count: int, repeats: bool, label: str, number: int) -> Iterator[Piece]:

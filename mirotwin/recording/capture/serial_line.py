@@ -112,8 +112,9 @@ def _wires(head: Sequence[Change], names: Sequence[str], facts: Facts) -> dict[i
             )
         facts.spacing_ticks = round(_FRAME_BITS * bit_ticks)
     if not wires:
-        reason = f"none of its {len(names)} channels carries characters"
-        raise InputError(facts.label, reason, "give --baud and --wire")
+        there = f"no channel carries characters ({', '.join(names[:16])})" if names else "has no channel"
+        remedy = "name the rate and the channel, --baud RATE --wire NAME" if names else "export a channel"
+        raise InputError(facts.label, there, remedy)
     return wires
 
 

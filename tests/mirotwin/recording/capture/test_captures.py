@@ -280,9 +280,9 @@ def test_two_images_are_compared_under_the_bytes_of_a_capture(mirotwin, capture,
         (b"PK\x03\x04meta.json", "is a Logic 2 session; export its data as CSV"),
         (b"PK\x03\x04metadata", "is a damaged zip file"),
         (b"\x1f\x8b\x08", "is packed by gzip; unpack it first"),
-        (b"$timescale 1 ns $end $enddefinitions $end #0", "none of its 0 channels carries characters"),
+        (b"$timescale 1 ns $end $enddefinitions $end #0", "has no channel; export a channel"),
         (b"<SALEAE>" + bytes(4) + b"\x01" + bytes(7), "holds an analog channel"),
-        (b"Time [s],Channel 0\n0.0,1\n0.1,0\n", "none of its 1 channels carries characters"),
+        (b"Time [s],Channel 0\n0.0,1\n0.1,0\n", "no channel carries characters (Channel 0); name the rate"),
         (b"name,price\nx,2\n", "is text in no form that is known"),
     ],
 )
@@ -290,3 +290,46 @@ def test_what_is_no_capture_of_characters_is_named_with_its_remedy(data, reason)
     with pytest.raises(BadInput) as failure:
         read(data)
     assert reason in f"{failure.value}"
+
+
+@pytest.mark.parametrize("name", ["saleae1.csv", "saleae2.csv", "saleae_digital.csv"])
+def test_times_before_a_trigger_are_negative_and_lose_nothing(mirotwin, capture, name):
+    path = capture(name)
+    times = re.compile(r"(?m)^((?:\"[^\"]*\",)*)([0-9]\.[0-9]{9})")
+    path.write_text(times.sub(lambda row: f"{row[1]}{float(row[2]) - 0.3:.9f}", path.read_text()))
+    code, out, err = mirotwin("decode", path)
+    assert code == 0
+    assert f"{path}: times are moved by 1 s, to begin near 0" in err
+    assert "passed over" not in err
+    assert f"frames: {len(FRAMES)} accepted, 0 stale, 0 telemetry; 0 damaged" in out
+
+
+@pytest.mark.parametrize(("offset", "base"), [("07o", 8), ("07d", 10), ("08x", 16)])
+def test_a_star_in_a_dump_repeats_the_line_before_to_the_next_offset(mirotwin, tmp_path, offset, base):
+    row = " ".join(["55"] * 16)
+    path = tmp_path / "dump.txt"
+    path.write_text(
+        f"{0:{offset}} {row}\n*\n{96:{offset}} {row}\n{112:{offset}} {row}\n{128:{offset}} 2a\n{129:{offset}}\n"
+    )
+    _, out, err = mirotwin("decode", path)
+    assert f"its offsets, to base {base}, agree" in err
+    assert "1 damaged run of 129 bytes" in out
+
+
+def test_characters_that_are_missing_in_a_dump_are_counted(mirotwin, capture):
+    path = capture("xxd.txt")
+    rows = path.read_text().splitlines(keepends=True)
+    path.write_text("".join(rows[:2] + rows[5:8] + rows[9:]))
+    err = mirotwin("decode", path)[2]
+    assert f"{path}: by the offsets 64 characters missing, first before line 3; copy the whole dump" in err
+
+
+def test_a_signal_without_characters_is_named(mirotwin, tmp_path):
+    path = tmp_path / "still.csv"
+    path.write_text("Time [s],Channel 7\n0.0,1\n")
+    code, _, err = mirotwin("decode", path)
+    assert code == 2
+    assert (
+        "no channel carries characters (Channel 7); name the rate and the channel, --baud RATE --wire NAME"
+        in err
+    )
