@@ -26,12 +26,9 @@ def move(name: str, session: Session, rest: str) -> None:
     forward = name.removeprefix("r")
     takes = forward in (*_REPEATED, "continue")
     if rest and not (takes and rest.isdecimal() and 0 < int(rest[:9]) <= _MOST_TIMES):
-        raise BadInput(
-            "",
-            rest,
-            f"is more than {name} takes",
-            "give how often" if takes else "repeat it by an empty line",
-        )
+        if takes:
+            raise BadInput("", name, f"{rest} is no number of times", f"give 1 to {_MOST_TIMES}")
+        raise BadInput("", rest, f"is more than {name} takes", "repeat it by an empty line")
     by_instruction = forward in ("stepi", "nexti")
     verb = name.removesuffix("i") if forward == "nexti" else name
     why = ""

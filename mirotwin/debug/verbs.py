@@ -162,6 +162,9 @@ def do(session: Session, line: str) -> Verb | None:
     form = ""
     if verb.has_form and rest[:1] == "/":
         form, _, rest = rest[1:].partition(" ")
+    if not rest.strip() and verb.takes[:1].isupper():
+        needed = verb.takes.split()[0]
+        raise BadInput("", verb.name, f"lacks {needed}", f"write {verb.name} {verb.takes}")
     more = (form,) if verb.has_form else ()
     verb.does(session, rest.strip(), *more)
     return verb
