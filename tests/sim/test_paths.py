@@ -138,7 +138,10 @@ def test_another_path_is_a_difference_of_two_runs(here):
             "x,y\n40,40\n41,40\n",
             "lap.csv: line 3: less than 7.5 cm from line 2, the length of the robot; move them",
         ),
-        ("x,y,speed\n40,40,9\n60,40,\n", "lap.csv: line 2: "),
+        (
+            "x,y,speed\n40,40,9\n60,40,\n",
+            "lap.csv: line 2: speed_m_s: 9.0 is out of range; must be <= 1.46",
+        ),
         ('t,x,y\n0,"40,40\n1,50,40\n', "lap.csv: line "),
     ],
 )

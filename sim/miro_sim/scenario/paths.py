@@ -25,7 +25,7 @@ import msgspec
 from miro_exact.bad_input import did_you_mean
 from miro_exact.inputs import decode, path_beside, read_input
 from miro_host.registries import REFERENCES
-from miro_sim.scenario.errors import ScenarioError
+from miro_sim.scenario.errors import ScenarioError, value_error
 from miro_sim.scenario.plugins import table_of
 from miro_sim.scenario.variants import tables_in
 
@@ -42,7 +42,7 @@ COLUMNS = {
 """Key of a point to the shorter names that its column may have."""
 _NAMES = {name: key for key, others in COLUMNS.items() for name in (key, *others)}
 _HEADS = "write t,x,y (s, cm), or x,y with speed (m/s) and heading (degrees) or without"
-_POINT = re.compile(r"\$?\.?points\[(\d+)\]")
+_POINT = re.compile(r"points\[(\d+)\](\.?)")
 
 
 def put_paths(raw: Table, origin: str, in_file: bool = True) -> bool:
@@ -151,10 +151,10 @@ def _check(table: Table, path: str, lines: Sequence[int]) -> None:
     try:
         msgspec.convert(table, struct)
     except msgspec.ValidationError as error:
-        what = str(error).removesuffix(" - at `$`")
-        at = _POINT.search(what)
-        place = f"line {lines[int(at[1])]}" if at else ""
-        told = _POINT.sub(lambda match: f"line {lines[int(match[1])]}", what).removeprefix(f"{place}: ")
-        reason, _, remedy = told.partition("; ")
-        if at or what.startswith(POINTS):
-            raise ScenarioError(path, place, reason, remedy) from None
+        wrong = value_error(path, table, str(error))
+        place, what = (
+            _POINT.sub(lambda match: f"line {lines[int(match[1])]}{': ' * bool(match[2])}", text)
+            for text in (f"{wrong.place}", wrong.what)
+        )
+        if f"{wrong.place}".startswith(POINTS):
+            raise ScenarioError(path, place, what, wrong.remedy) from None
