@@ -163,7 +163,7 @@ def _read_recording(path: str, options: DiffOptions) -> ComparedRun:
     check_no_folder(path)
     data = read_input(path, prefix=MAGIC, prefix_limit=RECORDING_BYTES)
     if not MAGIC.startswith(data[: len(MAGIC)]):
-        remedy = "give a run.mcap that `mirotwin run` wrote, or two images (.ihx)"
+        remedy = "give a run.mcap, or two images (.ihx); `mirotwin replay FILE --out FOLDER` makes one of a capture"
         raise BadInput(path, "offset 0", "not a recording", remedy)
     recording = parse(data, path)
     source = recording.source

@@ -17,6 +17,7 @@
 | lines with a time and pairs of hexadecimal digits | stamped |
 | nothing but pairs of hexadecimal digits, separators and comments | hex |
 | the first line of a PuTTY log | putty |
+| a colon and pairs of hexadecimal digits: a firmware image | refused |
 | anything else that is no text, nothing included | raw |
 
 Any bytes may be a raw capture, so the other rules can be wrong about one; the form is therefore always printed, and can
@@ -44,6 +45,7 @@ _PACKED = {b"\x1f\x8b\x08": "gzip", b"PK\x03\x04": "zip", b"\xfd7zXZ\0": "xz", b
 _STREAM = re.compile(
     r"#\s*mirotwin stream\b|(?:\s|#[^\n]*+\n)*+(?:[0-9]+|[0-9.]+(?:h|min|s|ms|us))[ \t]+[<>*]", re.ASCII
 )
+_INTEL_HEX = re.compile(rb"\s*:(?:[0-9A-Fa-f]{2}){5,}\s")
 _VCD = re.compile(rb"(?:\xef\xbb\xbf)?\s*\$(?:date|version|comment|timescale|scope)\s")
 _SIGROK = (b"metadata", b"logic-1")
 
@@ -59,10 +61,14 @@ class Detected(NamedTuple):
 def detect(head: bytes) -> Detected:
     """The form of a file that begins with `head`: the whole file, or its first `input.HEAD_BYTES`."""
     whole = len(head) < HEAD_BYTES
+    if not head:
+        return Detected("raw", "it is empty")
     if found := _by_first_bytes(head):
         return found
     if _STREAM.match(text_of(head, whole)):
         return Detected("stream", "its first line is one of ticks")
+    if _INTEL_HEX.match(head):
+        return Detected("", "is a firmware image (Intel HEX)", "give a capture, or --from-form hex")
     if found := _by_lines(_lines(head, whole)):
         return found
     if HexText.begins(head, whole):
@@ -72,7 +78,11 @@ def detect(head: bytes) -> Detected:
     if TERMINAL.match(head):
         return Detected("putty", "its first line is PuTTY's")
     if is_text(head, whole):
-        return Detected("", "is text in no form that is known", "name it with --from-form, or take it as raw")
+        return Detected(
+            "",
+            "is text in no form that is known",
+            "name it with --from-form, or give --from-form raw",
+        )
     return Detected("raw", "no form fits")
 
 
@@ -93,7 +103,7 @@ def _by_first_bytes(head: bytes) -> Detected | None:
                 return Detected("sigrok", "a zip file with its parts")
             if b"digital-0.bin" in head or b"meta.json" in head:
                 return Detected("", "is a Logic 2 session", "export its data as CSV (File, Export)")
-            return Detected("", f"is packed by {packer}", "unpack it first, or take it as --from-form raw")
+            return Detected("", f"is packed by {packer}", "unpack it first, or give --from-form raw")
     return None
 
 

@@ -20,7 +20,7 @@ class HexError(BadInput):
     """Text that is no pair of digits: path, line and column (from 1), what, remedy."""
 
     def __init__(self, path: str, line: int, column: int, reason: str) -> None:
-        remedy = "write two hex digits a character, or force another --format"
+        remedy = "write two hex digits a character, or name another form with --from-form"
         super().__init__(path, (line, column), reason, remedy)
 
 

@@ -57,7 +57,7 @@ class Facts:
             return
         kinds = ", ".join(amount(count, kind) for kind, count in sorted(self._foreign.items()))
         if not read_any:
-            raise InputError(self.label, f"no characters in {kinds}", "is --from-form the right one?")
+            raise InputError(self.label, f"no characters in {kinds}", "name another form with --from-form")
         self.tell(f"{self.label}: passed over {kinds} without characters, the first at {self._first}")
 
 

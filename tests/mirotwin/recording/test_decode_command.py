@@ -127,7 +127,8 @@ def test_plain_text_is_taken_for_bytes_only_where_that_is_said():
     code, lines, err = decode(b"hello world, how are you?")
     assert (code, lines) == (2, [])
     assert (
-        "standard input: is text in no form that is known; name it with --from-form, or take it as raw" in err
+        "standard input: is text in no form that is known; name it with --from-form, or give --from-form raw"
+        in err
     )
     code, lines, _ = decode(b"hello world, how are you?", "--from-form", "raw")
     assert code == 0

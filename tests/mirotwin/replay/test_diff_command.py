@@ -169,7 +169,10 @@ def test_half_a_recording_is_compared_as_far_as_it_goes(mirotwin, finished, tmp_
     ("content", "expected"),
     [
         (b"", "offset 0: empty file"),
-        (b"792000 > 55 55\n", "offset 0: not a recording; give a run.mcap that `mirotwin run` wrote"),
+        (
+            b"792000 > 55 55\n",
+            "offset 0: not a recording; give a run.mcap, or two images (.ihx); `mirotwin replay",
+        ),
         (b"\x89PNG\r\n\x1a\n\0\0", "offset 0: not a recording"),
         (b"\x89MCAP0\r\n" + bytes(100), "offset"),
     ],

@@ -53,8 +53,16 @@ def test_the_beginning_tells_the_format(head, format):
     [b"hello", b"55 5", b"# only a comment", b"12 | 55", b"   \n", b"\xef\xbb\xbfhello", b"\xff\xfeh\0i\0"],
 )
 def test_text_in_no_known_form_is_not_taken_for_bytes(text):
-    remedy = "name it with --from-form, or take it as raw"
+    remedy = "name it with --from-form, or give --from-form raw"
     assert detect(text) == ("", "is text in no form that is known", remedy)
+
+
+def test_a_firmware_image_is_no_capture():
+    assert detect(b":0400000002002932AF\r\n:00000001FF\r\n")[:2] == ("", "is a firmware image (Intel HEX)")
+
+
+def test_an_empty_file_is_called_empty():
+    assert detect(b"") == ("raw", "it is empty", "")
 
 
 def test_a_packed_file_is_said_to_be_packed():
