@@ -138,10 +138,14 @@ class Line(NamedTuple):
 
 
 class Fates:
-    """The result at each robot of what hosts `sent`, from the marks of the air."""
+    """The result at each robot of what hosts `sent`, from the marks of the air up to `to_tick` (None: all)."""
 
     def __init__(
-        self, sent: Sequence[Transmission], marks: Sequence[LinkMark], delays: Sequence[int]
+        self,
+        sent: Sequence[Transmission],
+        marks: Sequence[LinkMark],
+        delays: Sequence[int],
+        to_tick: int | None,
     ) -> None:
         self._kinds: dict[tuple[int, int], dict[int, str]] = {}
         self._ticks: dict[int, list[int]] = {}
@@ -151,7 +155,8 @@ class Fates:
             if mark.robot is not None and mark.kind in FATES:
                 network, slot = mark.robot
                 kinds = self._kinds.setdefault((network, mark.start_tick - delays[network]), {})
-                kinds[slot] = FATES[mark.kind]
+                over = to_tick is None or mark.end_tick <= to_tick
+                kinds[slot] = FATES[mark.kind if over else "open"]
 
     def of(self, row: DecodedRow) -> str:
         """In a word, or robot by robot where it is not the same for all."""
@@ -195,7 +200,7 @@ def frame_tables(
     networks = job.spec.robot_scenario.networks
     sent = transmissions_of(job.recorded or replayed)
     delays = [ticks(network.radio.latency_s) for network in networks]
-    fates = Fates([one for one in sent if one.direction == DOWN], marks, delays)
+    fates = Fates([one for one in sent if one.direction == DOWN], marks, delays, to_tick)
     several = len(networks) > 1
     frames = []
     for row in rows(sent, lambda network: networks[network].robots):

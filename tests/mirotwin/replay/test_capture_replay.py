@@ -92,6 +92,12 @@ def test_robots_that_hear_otherwise_are_named(mirotwin, capture):
     assert lines_with(lines, "damaged at ")
 
 
+def test_a_frame_that_ends_after_the_window_is_under_way(mirotwin, capture):
+    lines = mirotwin.succeeds("replay", capture, "--to", "40ms").splitlines()
+    assert [line.split()[-1] for line in lines_with(lines, "  >  ")] == ["fresh", "way"]
+    assert "from the host: 1 fresh, 1 under way" in lines
+
+
 @pytest.fixture(scope="module")
 def recorded(mirotwin, capture, tmp_path_factory):
     folder = tmp_path_factory.mktemp("out") / "rec"
