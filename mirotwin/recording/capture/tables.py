@@ -72,7 +72,7 @@ class Table(msgspec.Struct, frozen=True):
         """Which columns characters come from."""
         if self.kind != "characters":
             return amount(len(self.levels) + (self.time >= 0), "column") + " used"
-        stop = f"; {self.names[self.errors[0]]} says stop bits" if self.errors else ""
+        stop = f"; bad stop bits from {self.names[self.errors[0]]}" if self.errors else ""
         return f"2 columns used: {self.names[self.time]} and {self.names[self.value]}{stop}"
 
 
