@@ -265,7 +265,7 @@ def test_a_page_that_is_too_large_is_refused_and_the_remedy_works(two, tmp_path,
     [
         (["nothing"], "nothing: No such file or directory"),
         (["empty"], "empty: holds neither run.mcap nor case.stream; give a run's folder"),
-        (["text.txt"], "text.txt:1:1: 'hello' is not a tick"),
+        (["text.txt"], "text.txt: is text in no form that is known"),
         (["a.board.toml"], "a.board.toml: is no run, but what one is made from; run it with `mirotwin run`"),
         (["gone.parquet"], "gone.parquet: No such file or directory"),
         (["fig6", "--from", "9s"], "--from 216000000t: the recording goes from tick 0 to"),
