@@ -20,8 +20,10 @@ from mirotwin.verify.cases.artifacts import FIRMWARE, case_lines
 
 
 def counts(outcome: Outcome, named: bool, known: Mapping[str, str]) -> bool:
-    """Whether its verdict counts for the exit code: not that of a rule of `known`, or behind another that failed; and
-    that a rule is not judged only where somebody has `named` it.
+    """Whether its verdict counts for the exit code.
+
+    Neither the failure of a `known` rule does, nor a rule behind another that failed. "Not judged" counts only for a
+    rule that the user `named`.
     """
     if outcome.cause or (outcome.rule in known and outcome.failures):
         return False

@@ -30,7 +30,7 @@ from miro_robot.mcs51.opcodes import SFRS
 from mirotwin.debug.board_values import GROUPS, value_on
 from mirotwin.debug.debugger import ACCESSES, STEPPED, Breakpoint, Debugger
 from mirotwin.debug.expression import Term, Value, children, content, expression
-from mirotwin.debug.looking import REGISTERS
+from mirotwin.debug.looking import SHOWN_REGISTERS
 from mirotwin.debug.session import Session
 from mirotwin.debug.shown import quoted, shown_value, text_in
 from mirotwin.debug.subject import launched, open_subject
@@ -524,7 +524,7 @@ class Adapter:
             file = AnyPath(line.file).stem
             yield f"Statics of {file}.c", None, moment.variables(file).items()
         yield "Globals", "globals", moment.variables("").items()
-        for title, names in (("Registers", REGISTERS), ("Special function registers", SFRS)):
+        for title, names in (("Registers", SHOWN_REGISTERS), ("Special function registers", SFRS)):
             yield title, "registers", [(name, partial(moment.find, name, "")) for name in names]
         if moment.core.board is not None:
             for side, chip in children(moment.find("lm629", "")):

@@ -28,7 +28,7 @@ _TOKEN = re.compile(
 _MOST_CHARACTERS, _MOST_TOKENS, _MOST_SHIFT, _MOST_DIGITS = 4096, 128, 64, 80
 _LEVELS = ("||", "&&", "|", "^", "&", "== !=", "< <= > >=", "<< >>", "+ -", "* / %")
 _RANKS = {sign: rank for rank, signs in enumerate(_LEVELS) for sign in signs.split()}
-REGISTERS = (*(f"R{at}" for at in range(8)), "A", "B", "DPTR", "SP", "PSW", "PC", *SFRS)
+REGISTERS = (*(f"R{at}" for at in range(8)), "A", "B", "DPTR", "SP", "PSW", "PC")
 _ESCAPES = {"n": 10, "r": 13, "t": 9, "0": 0}
 MEMORY_OF_POINTER = {"DC": "code", "DX": "xram", "DP": "xram", "DD": "iram", "DI": "iram"}
 _GENERIC = {0x00: "xram", 0x40: "iram", 0x60: "xram", 0x80: "code"}
@@ -332,8 +332,9 @@ class _Reader:
     def register(self, token: str) -> Term:
         """`$sp`, `$r7`: as gdb has them, the number in a register."""
         name = token[1:].upper()
-        if name not in REGISTERS:
-            raise NoValue(f"{token} is no register", did_you_mean(name, REGISTERS))
+        known = (*REGISTERS, *SFRS)
+        if name not in known:
+            raise NoValue(f"{token} is no register", did_you_mean(name, known))
 
         def value(moment: Lookup) -> Value:
             found = moment.find(name, "")

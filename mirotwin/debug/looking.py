@@ -4,20 +4,22 @@ from __future__ import annotations
 
 import re
 from collections.abc import Callable, Iterator
+from copy import copy
 from itertools import count
 
 from miro_exact.bad_input import BadInput, amount
 from miro_robot.image.symbol_files import read_text
 from miro_robot.inspect.frames import RESET_SP, StackFrame
 from miro_robot.mcs51.opcodes import LENGTH, SFRS, disassemble
-from mirotwin.debug.expression import NoValue, Value, expression, number, pointed
+from mirotwin.debug.expression import REGISTERS, NoValue, Value, expression, number, pointed
 from mirotwin.debug.session import Examined, Session
 from mirotwin.debug.shown import FORMS, in_form, lines_of, quoted, shown, text_at
 from mirotwin.debug.stops import tell_all
 from mirotwin.debug.symbols import SIZES
 
 LINES_AROUND = 5
-REGISTERS = (*(f"R{at}" for at in range(8)), "A", "B", "DPTR", "SP", "PSW", "PC", "tick", "cycle")
+SHOWN_REGISTERS = (*REGISTERS, "tick", "cycle")
+"""Those of `info registers`."""
 _UNITS = {"b": 1, "h": 2, "w": 4, "g": 8}
 _EXAMINE = re.compile(r"([0-9]{0,5})([a-z]{0,2})")
 _ROW_BYTES = {1: 8, 2: 16, 4: 16, 8: 16}
@@ -113,10 +115,10 @@ def display(session: Session, rest: str, how: str = "") -> None:
         return list(lines_of(rest, expression(rest)(session.moment()), how))
 
     lines()
-    number_of_it = next(at for at in count(1) if at not in session.displays)
-    session.displays[number_of_it] = (f"{how and '/'}{how} {rest}".strip(), lines)
+    display_number = next(at for at in count(1) if at not in session.displays)
+    session.displays[display_number] = (f"{how and '/'}{how} {rest}".strip(), lines)
     for line in lines():
-        session.tell(f"{number_of_it}: {line}")
+        session.tell(f"{display_number}: {line}")
 
 
 def undisplay(session: Session, rest: str) -> None:
@@ -138,8 +140,7 @@ def examine(session: Session, rest: str, how: str = "") -> None:
 
 
 def _wanted(session: Session, rest: str, how: str) -> Examined:
-    last, wanted = session.examined or Examined(), Examined()
-    wanted.__dict__.update(vars(last))
+    wanted = copy(session.examined or Examined())
     parts = _EXAMINE.fullmatch(how)
     if parts is None:
         raise BadInput(
@@ -248,9 +249,9 @@ def source(session: Session, rest: str) -> None:
     middle = int(number_asked) if ":" in wanted and number_asked.isdecimal() else line.line
     stands = session.symbols.line(here)
     marked = stands.line if stands is not None and stands.file == line.file else -1
-    for number_of_it, text in enumerate(read_text(path).splitlines(), 1):
-        if abs(number_of_it - middle) <= LINES_AROUND:
-            session.tell(f"{'=>' if number_of_it == marked else '  '} {number_of_it:4}  {text}")
+    for line_number, text in enumerate(read_text(path).splitlines(), 1):
+        if abs(line_number - middle) <= LINES_AROUND:
+            session.tell(f"{'=>' if line_number == marked else '  '} {line_number:4}  {text}")
 
 
 def function(session: Session, rest: str) -> None:
@@ -283,14 +284,17 @@ def info(session: Session, rest: str) -> None:
     names = [name for name in INFO if name.startswith(word)] if word else []
     if not names:
         raise BadInput(
-            "", f"info {word}".strip(), "is not known" if word else "of what?", f"there are {', '.join(INFO)}"
+            "",
+            f"info {word}".strip(),
+            "is not known" if word else "lacks what to show",
+            f"there are {', '.join(INFO)}",
         )
     INFO[names[0]](session, more.strip())
 
 
 def _registers(session: Session, rest: str) -> None:
-    for name in [word.lstrip("$").upper() for word in rest.split()] or REGISTERS:
-        found = session.moment().find(name if name in (*SFRS, *REGISTERS) else name.lower(), "")
+    for name in [word.lstrip("$").upper() for word in rest.split()] or SHOWN_REGISTERS:
+        found = session.moment().find(name if name in (*SFRS, *SHOWN_REGISTERS) else name.lower(), "")
         session.tell(f"{name:5} {shown(found)}")
 
 
@@ -340,8 +344,8 @@ def _line(session: Session, rest: str) -> None:
 
 
 def _displays(session: Session, rest: str) -> None:
-    for number_of_it, (text, _) in session.displays.items():
-        session.tell(f"{number_of_it}: {text}")
+    for display_number, (text, _) in session.displays.items():
+        session.tell(f"{display_number}: {text}")
 
 
 INFO: dict[str, Callable[[Session, str], None]] = {

@@ -266,7 +266,7 @@ class Moment:
         return in_memory | {one.name: partial(self._local, places, one) for one in inner_last}
 
     def _local_meaning(self, name: str) -> Meaning | None:
-        """The same of one name; None for what is no local variable here."""
+        """How the value of a local variable is found; None for a name that is none here."""
         places = self._places()
         if places is None:
             return None

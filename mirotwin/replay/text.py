@@ -162,8 +162,8 @@ class Fates:
         """In a word, or robot by robot where it is not the same for all."""
         if isinstance(row.event, Damaged):
             return IGNORED if row.event.reason in (Reason.NO_SYNC, Reason.CUT_SHORT) else "damaged"
-        ticks = self._ticks[row.network]
-        tick = ticks[bisect_right(ticks, row.event.start_tick) - 1]
+        begins = self._ticks[row.network]
+        tick = begins[bisect_right(begins, row.event.start_tick) - 1]
         by_robot = self._kinds.get((row.network, tick), {})
         words = set(by_robot.values())
         if len(words) > 1:

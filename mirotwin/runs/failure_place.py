@@ -22,7 +22,7 @@ def located(run: Run, result: Result) -> Result:
 
 
 def located_in(spec: RunSpec, result: Result) -> Result:
-    """The same of a run by its script. A step fails for the first device."""
+    """The result with the place of its first failure, of a run by its script. A step fails for the first device."""
     if result.failed_tick < 0:
         return result
     first = result.failures[0] if result.failures and result.step_tick < 0 else None

@@ -75,7 +75,7 @@ def iterate(
 def iterate_pcap(
     data: bytes | Callable[[int], bytes], source: str = "<capture>", passed_over: Counter[str] | None = None
 ) -> Iterator[Transmission]:
-    """The same of a capture in the old pcap format, with times in micro- or nanoseconds."""
+    """As `iterate`, of a capture in the old pcap format, with times in micro- or nanoseconds."""
     return _only_serial(_PcapReader, data, source, passed_over)
 
 
@@ -320,5 +320,5 @@ def _foreign(head: bytes) -> tuple[str, str]:
     if not head:
         return "empty file", "give a pcapng capture"
     if head[:4] in CLASSIC_PCAP:
-        return "a capture in the old pcap format", "read it as one"
+        return "a capture in the old pcap format", "read it as pcap"
     return "not a pcapng file", "give a capture that was saved as pcapng"

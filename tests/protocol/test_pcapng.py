@@ -149,7 +149,7 @@ def test_what_was_passed_over_is_told_by_the_events_names():
     [
         (b"", "offset 0: empty file"),
         (b"hello world!", "offset 0: not a pcapng file"),
-        (b"\xd4\xc3\xb2\xa1" + bytes(20), "old pcap format; read it as one"),
+        (b"\xd4\xc3\xb2\xa1" + bytes(20), "old pcap format; read it as pcap"),
         (
             big_endian(linktype=1),
             "no packet of a serial line, but 1 packet of link type 1; give a capture of a serial",

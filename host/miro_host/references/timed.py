@@ -85,14 +85,14 @@ class Timed:
         square = dx * dx + dy * dy
         v = math.sqrt(square)
         if v < STANDS_M_S:
-            at = Posture(x, y, self.pieces[number].heading_rad)
-            return with_polar_form(at, 0.0, 0.0, 0.0, 0.0)
-        at = Posture(x, y, atan2(dy, dx))
+            posture = Posture(x, y, self.pieces[number].heading_rad)
+            return with_polar_form(posture, 0.0, 0.0, 0.0, 0.0)
+        posture = Posture(x, y, atan2(dy, dx))
         if inside_s != t_s:
-            return with_polar_form(at, 0.0, 0.0, 0.0, 0.0)
+            return with_polar_form(posture, 0.0, 0.0, 0.0, 0.0)
         w, v_dot = (dx * d2y - dy * d2x) / square, (dx * d2x + dy * d2y) / v
         w_dot = (dx * d3y - dy * d3x) / square - 2.0 * w * v_dot / v
-        return with_polar_form(at, v, w, v_dot, w_dot)
+        return with_polar_form(posture, v, w, v_dot, w_dot)
 
     def pace(self, step_m: float, step_rad: float) -> SamplingPace:
         """By the largest speed and turning rate at points and between them, twice as closely as these need.

@@ -36,7 +36,7 @@ from mirotwin.recording.capture.forms import TERMINAL
 from mirotwin.recording.capture.hextext import HexText
 from mirotwin.recording.capture.input import HEAD_BYTES
 from mirotwin.recording.capture.tables import table_of
-from mirotwin.recording.capture.text import is_text, text_of
+from mirotwin.recording.capture.text import head_lines, is_text, text_of
 from mirotwin.recording.writer import MAGIC as MCAP
 
 _ENOUGH = 4
@@ -109,11 +109,9 @@ def _by_first_bytes(head: bytes) -> Detected | None:
 
 def _lines(head: bytes, whole: bool) -> list[str]:
     """The first lines that say something, without one that is cut."""
-    text = text_of(head, whole)
-    if "\0" in text[:_ENOUGH]:
+    lines = head_lines(head, whole)
+    if "\0" in lines[0][:_ENOUGH]:
         return []
-    lines = re.split(r"\r\n|\n|\r", text)
-    lines = lines if whole or len(lines) == 1 else lines[:-1]
     return [line for line in lines if line.strip()][:_SAMPLE_LINES]
 
 

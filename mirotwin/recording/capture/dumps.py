@@ -17,7 +17,6 @@ from mirotwin.recording.capture.pieces import Facts, Piece, direction_in
 REPEATED_BYTES = 64 << 20
 """More than this behind a `*` is a damaged offset."""
 _ROW = re.compile(r"\s*(?P<offset>[0-9A-Fa-f]{4,16})(?P<colon>:?)(?:\s+(?P<body>.*))?")
-_TEXT_COLUMN = re.compile(r"\s[|>].*|\s\s+[^|]*$")
 _GROUP = re.compile(r"(?:[0-9A-Fa-f]{2}){1,8}")
 _ANNOTATION = re.compile(
     r"\s*(?:[0-9]+-[0-9]+\s+)?(?P<source>[A-Za-z][\w /\[\]]*?(?:-[0-9]+)?):\s+(?:(?P<kind>[A-Za-z][\w -]*):\s+)?"
@@ -122,7 +121,7 @@ def _held_pieces(data: bytes, count: int, repeats: bool, label: str, number: int
         return
     if count > REPEATED_BYTES:
         reason = f"line {number}: the offset is {count} bytes behind the last"
-        raise InputError(label, reason, "is the dump whole?")
+        raise InputError(label, reason, "copy the whole dump")
     whole, rest = divmod(count, len(data))
     for _ in range(whole):
         yield Piece(None, "", data)

@@ -17,7 +17,7 @@ from mirotwin.recording.capture import dumps, hexlines, tables
 from mirotwin.recording.capture.input import HEAD_BYTES, Input
 from mirotwin.recording.capture.pieces import Facts, Piece
 from mirotwin.recording.capture.serial_line import characters_of
-from mirotwin.recording.capture.text import lines_of, text_of
+from mirotwin.recording.capture.text import head_lines, lines_of
 
 Reader = Callable[[Input, Facts], Iterator[Piece]]
 Packets = Callable[[Callable[[int], bytes], str, Counter[str]], Iterator[Transmission]]
@@ -38,9 +38,7 @@ class Form(msgspec.Struct, frozen=True):
 def _head_lines(given: Input) -> list[str]:
     """The first lines, without one that is cut."""
     head = given.peek()
-    whole = len(head) < HEAD_BYTES
-    lines = re.split(r"\r\n|\n|\r", text_of(head, whole))
-    return lines if whole else lines[:-1]
+    return head_lines(head, len(head) < HEAD_BYTES)
 
 
 def _packets(given: Input, facts: Facts, iterate: Packets) -> Iterator[Piece]:
@@ -69,7 +67,11 @@ def _annotations(given: Input, facts: Facts) -> Iterator[Piece]:
 def _table(given: Input, facts: Facts) -> Iterator[Piece]:
     table = tables.table_of(_head_lines(given))
     if table is None:
-        raise InputError(given.label, "has no columns of times and characters or levels", "is it this form?")
+        raise InputError(
+            given.label,
+            "has no columns of times and characters or levels",
+            "name another form with --from-form",
+        )
     if table.kind == "characters":
         return tables.read_characters(lines_of(given), facts, table)
     return characters_of(tables.read_levels(lines_of(given), facts, table), table.names, facts)

@@ -4,32 +4,23 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Iterator, Sequence
 
-from miro_exact.bad_input import BadInput
 from miro_protocol.table import ROBOT_COUNTS
 from miro_protocol.transmission import Transmission
+from mirotwin.recording.capture.pieces import peeked
 
 HEAD_CHARACTERS = 1 << 16
 
 
 def head_of(sent: Iterator[Transmission]) -> tuple[list[Transmission], Iterator[Transmission]]:
     """The first transmissions, and an iterator over all; an error comes in its place."""
-    head: list[Transmission] = []
     size = 0
-    failure: Exception | None = None
-    try:
-        while size < HEAD_CHARACTERS and (transmission := next(sent, None)) is not None:
-            head.append(transmission)
-            size += len(transmission.data)
-    except BadInput as error:
-        failure = error
 
-    def everything() -> Iterator[Transmission]:
-        yield from head
-        if failure is not None:
-            raise failure
-        yield from sent
+    def is_short(transmission: Transmission) -> bool:
+        nonlocal size
+        size += len(transmission.data)
+        return size < HEAD_CHARACTERS
 
-    return head, everything()
+    return peeked(sent, HEAD_CHARACTERS, is_short)
 
 
 def frame_counts(sent: Iterable[Transmission]) -> dict[int, int]:

@@ -65,11 +65,7 @@ def read(lines: Iterator[str], facts: Facts) -> Iterator[Piece]:
     in_block = told = False
     for number, line in enumerate(lines, 1):
         match = _STAMPED.match(line)
-        if (
-            in_block
-            and not (match and _is_plain(match))
-            and (bare := _ROW.fullmatch(line) or _BARE.match(line))
-        ):
+        if in_block and not (match and _is_plain(match)) and (bare := _in_block(line)):
             yield Piece(tick, direction, characters(bare["data"]))
             tick = None
             continue

@@ -112,9 +112,9 @@ class Joiner:
         offset = facts.offset_s * TICKS_PER_SECOND
         for piece in pieces:
             if piece.tick is not None and abs(piece.tick - offset) > MAX_TICK:
-                raise InputError(
-                    facts.label, f"a time of {piece.tick / TICKS_PER_SECOND:g} s", "is it damaged?"
-                )
+                reason = f"a time of {piece.tick / TICKS_PER_SECOND:g} s"
+                remedy = "copy the file again, or name another form with --from-form"
+                raise InputError(facts.label, reason, remedy)
             yield (
                 piece._replace(tick=max(0, piece.tick - offset))
                 if offset and piece.tick is not None
@@ -140,10 +140,9 @@ class Joiner:
         tick = tick or 0
         if one is not None:
             self._push(self._open.pop(key).closed())
-        if len(self._open) > 0:
-            for other, late in [*self._open.items()]:
-                if tick > late.end_tick + 2 * late.step + self.facts.resolution_ticks:
-                    self._push(self._open.pop(other).closed())
+        for other, late in [*self._open.items()]:
+            if tick > late.end_tick + 2 * late.step + self.facts.resolution_ticks:
+                self._push(self._open.pop(other).closed())
         one = self._open[key] = _Open(piece, tick)
         one.append(piece, tick, spacing)
 

@@ -27,6 +27,8 @@ SALEAE = b"<SALEAE>"
 DEFINITIONS = 1 << 14
 """Signals of a VCD file."""
 _RATE = re.compile(r"([0-9]+(?:\.[0-9]+)?)\s*([kmg]?)(?:hz)?", re.IGNORECASE)
+_DAMAGED = (zipfile.BadZipFile, zlib.error, NotImplementedError, RuntimeError, OSError, ValueError, EOFError)
+"""What `zipfile` raises for a damaged file."""
 _PREFIXES = {"": 1, "k": 10**3, "m": 10**6, "g": 10**9}
 _SCALES = {"s": 1, "ms": 10**3, "us": 10**6, "ns": 10**9, "ps": 10**12, "fs": 10**15}
 
@@ -42,15 +44,7 @@ class Session:
                 text = metadata.read(METADATA_BYTES).decode("utf-8", "replace")
         except KeyError:
             raise self._error("is a zip file, but no sigrok session", "export the data as CSV") from None
-        except (
-            zipfile.BadZipFile,
-            zlib.error,
-            NotImplementedError,
-            RuntimeError,
-            OSError,
-            ValueError,
-            EOFError,
-        ):
+        except _DAMAGED:
             raise self._error("is a damaged zip file", "copy it again") from None
         parser = configparser.ConfigParser(strict=False, interpolation=None)
         try:
@@ -94,15 +88,7 @@ class Session:
                         whole = len(data) - len(data) % self.unit_bytes
                         rest = data[whole:]
                         yield data[:whole]
-        except (
-            zipfile.BadZipFile,
-            zlib.error,
-            NotImplementedError,
-            RuntimeError,
-            OSError,
-            ValueError,
-            EOFError,
-        ):
+        except _DAMAGED:
             raise self._error("ends in a damaged part", "save the session again") from None
 
     def changes(self) -> Iterator[Change]:

@@ -12,7 +12,6 @@ from miro_exact.inputs import InputError
 from miro_protocol import stream
 from miro_protocol.pcapng_reader import CaptureError
 from miro_protocol.stream import StreamError
-from miro_protocol.stream_header import Header
 from miro_protocol.transmission import DOWN, UP, Transmission, character_ticks
 from mirotwin.recording.capture import recorded
 from mirotwin.recording.capture.detect import detect
@@ -50,7 +49,7 @@ class Source(msgspec.Struct):
 
     @property
     def notes(self) -> list[str]:
-        """What a file that is made of it should say, once its first transmission was read."""
+        """Comments for a stream file made of it; complete once its first transmission was read."""
         offset = self.facts.offset_s
         return [f"from {self.form.title}: {moved_by(offset)}"] if offset else []
 
@@ -99,7 +98,7 @@ def timed_capture(
     options: CaptureOptions = AS_IT_SAYS,
     form: Form | None = None,
 ) -> Source:
-    """The same for those who need times. Raises InputError for a form without times, unless they are assumed."""
+    """As `open_capture`, for a replay. Raises InputError for a form without times, unless they are assumed."""
     source = open_capture(given, tell, options, form)
     if not source.timed and not options.assume_contiguous:
         remedy = "--assume-contiguous takes all characters to follow each other without a pause"
@@ -186,16 +185,10 @@ def _stream(given: Input, tell: Callable[[str], None]) -> Iterator[Transmission]
     for entry in reader:
         sent = stream.characters(entry, given.label)
         if not crystal_hz:
-            crystal_hz = _crystal_hz(reader.header)
+            crystal_hz = reader.header.clock
             if crystal_hz != TICKS_PER_SECOND:
                 tell(recorded.units_line(given.label, crystal_hz))
         yield recorded.in_usual_ticks(sent, crystal_hz)
-
-
-def _crystal_hz(header: Header) -> int:
-    """The clock of the file's ticks: the crystal that it names, or that a case for a bare processor names."""
-    named = header.crystal_hz or (header.bare or {}).get("crystal_hz")
-    return named if type(named) is int and named > 0 else TICKS_PER_SECOND
 
 
 def _lines(given: Input) -> Iterator[str]:

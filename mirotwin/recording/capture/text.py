@@ -28,6 +28,12 @@ def is_text(head: bytes, whole: bool) -> bool:
     return known and len(head) > mark and not _CONTROL.search(text) and "\ufffd" not in text
 
 
+def head_lines(head: bytes, whole: bool) -> list[str]:
+    """The lines of a beginning; without the last one, which may be cut, if it is not the `whole` file."""
+    lines = re.split(r"\r\n|\n|\r", text_of(head, whole))
+    return lines if whole or len(lines) == 1 else lines[:-1]
+
+
 def lines_of(given: Input) -> Iterator[str]:
     """The lines, without their ends."""
     head = given.peek()

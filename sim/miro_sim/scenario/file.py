@@ -170,9 +170,8 @@ def _checked(
     A setting that chooses another kind of something leaves the old kind's keys out; a note for each says which.
     """
     made = [*own, *make(raw, settings, origin)]
-    put_paths(
-        raw, origin, in_file=False
-    )  # that a setting names: a campaign's workers would read it at other times
+    # A file that a setting names is refused: a campaign's workers would read it at other times.
+    put_paths(raw, origin, in_file=False)
     dropped: dict[str, list[str]] = {}
     while True:
         try:

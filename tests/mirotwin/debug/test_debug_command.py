@@ -200,7 +200,7 @@ def test_a_case_whose_check_is_in_a_file_opens_with_it(mirotwin, tmp_path):
         ("print $sq", "$sq is no register"),
         ("display nothing", "there is no nothing here"),
         ("undisplay 3", "there is no display 3"),
-        ("info", "of what?; there are breakpoints, "),
+        ("info", "lacks what to show; there are breakpoints, "),
         ("info moon", "is not known"),
         ("info registers moon", "there is no moon here"),
         ("help moon", "is no command"),
