@@ -7,6 +7,7 @@ from collections.abc import Callable, Iterator, Sequence
 
 import msgspec
 
+from miro_exact.bad_input import one_line
 from miro_exact.clock import TICKS_PER_SECOND
 from miro_exact.inputs import InputError
 from miro_protocol import stream
@@ -78,13 +79,17 @@ def open_capture(
 
     `tell` gets what the user should hear: what the file was taken for, what was passed over, how times were moved.
     """
-    form = form or form_of(given, options, tell)
+
+    def say(line: str) -> None:
+        tell(one_line(line))  # a line may quote a damaged file, which could move the terminal's cursor
+
+    form = form or form_of(given, options, say)
     robots: dict[int, int] = {}
-    facts = Facts(given.label, tell, options.baud, options.wires)
+    facts = Facts(given.label, say, options.baud, options.wires)
     if form.name == "recording":
-        return Source(given.label, form, recorded.transmissions(given, robots, tell), robots, facts)
+        return Source(given.label, form, recorded.transmissions(given, robots, say), robots, facts)
     if form.name == "stream":
-        return Source(given.label, form, _stream(given, tell), robots, facts)
+        return Source(given.label, form, _stream(given, say), robots, facts)
     if form.read is not None:
         sent = Joiner(form.read(given, facts), facts).transmissions()
     else:

@@ -123,6 +123,13 @@ def test_a_damaged_capture_gives_transmissions_and_at_most_one_error(name, data)
     assert all(line.isprintable() for line in said)
 
 
+def test_a_word_of_a_damaged_capture_is_quoted_with_its_control_characters_escaped():
+    whole = FORMS["sigrok.csv"].write(SESSION[:3])
+    _, said = read(whole[:83] + b"\0" + whole[83:])
+    assert any(r"\x00" in line for line in said)
+    assert all(line.isprintable() for line in said)
+
+
 @given(st.one_of(st.binary(max_size=300), st.text(max_size=300).map(str.encode)), st.sampled_from([*KNOWN]))
 def test_any_bytes_read_as_any_form_give_transmissions_or_an_error(data, name):
     try:
