@@ -4,7 +4,7 @@
 
 rms      position, x, y in cm over the last second, truth against reference: median, and 95 % (the 48th of 50 values in
          order, the last of 20) and worst of the position
-never    runs that are outside 3 cm or 0.15 rad at some time of the last second, as a robot that has settled is not
+never    runs that have not settled: outside 3 cm or 0.15 rad at some time of the last second
 settled  median of the time after which a run stays inside, of the runs that are not counted as never
 back     runs in which the robot moves backwards by more than 1 cm/s at some time
 faults   firmware faults, all runs added up
@@ -13,13 +13,11 @@ faults   firmware faults, all runs added up
 from __future__ import annotations
 
 import argparse
-import math
 import statistics
 from collections.abc import Sequence
 from typing import NamedTuple
 
 from miro_exact.bad_input import BadInput
-from miro_exact.clock import CONTROL_PERIOD_TICKS, seconds
 from mirotwin.campaign.design import Level
 from mirotwin.campaign.drive import outcomes_of
 from mirotwin.campaign.plan import plan_of_levels
@@ -29,7 +27,6 @@ from mirotwin.campaign.worker import RunOutcome
 from mirotwin.campaign.workers import Processes
 from mirotwin.shell.processes import cores
 
-PERIOD_S = seconds(CONTROL_PERIOD_TICKS)
 RMS = ("rms_position_cm", "rms_x_cm", "rms_y_cm", "rms_theta_deg")
 HEAD = f"{'scenario':12} {'runs':>4}  {'rms position: median 95 % worst':32} {'x':>7} {'y':>7}"
 HEAD += "  never  settled  back  faults"
@@ -74,8 +71,6 @@ def figure_of(seed: int, outcome: RunOutcome) -> Figure:
     if outcome.error:
         raise BadInput("", f"seed {seed}", outcome.error)
     found = outcome.figures
-    settling_s = found["settling_s"]
-    last_s = PERIOD_S * (math.ceil(found["simulated_s"] / PERIOD_S - 1e-6) - 1)  # the last exposure
     position_cm, x_cm, y_cm, theta_deg = (0.0 if found[name] is None else found[name] for name in RMS)
     return Figure(
         seed=seed,
@@ -83,7 +78,7 @@ def figure_of(seed: int, outcome: RunOutcome) -> Figure:
         x_cm=x_cm,
         y_cm=y_cm,
         theta_deg=theta_deg,
-        settled_s=None if settling_s is None or settling_s > last_s - 1.0 else settling_s,
+        settled_s=found["settling_s"],
         backwards=bool(found["backward_s"]),
         faults=found["faults"] or 0,
     )

@@ -10,8 +10,9 @@ gain sets, the same starts (Figs. 6 to 10), the same loop and the same seeds, an
 3. Check: the best four drive with `CHECK` seeds, and the best of them is kept.
 4. Hold out: that set drives with `HELD_OUT` seeds, which chose nothing. They are the seeds of `mirotwin reproduce`.
 
-A run settles if it ends within 3 cm and 0.15 rad. A set settles from a start if 80 % of its runs do; in steps 1 to 3 it
-leaves a start as soon as that is out of reach. A run ends, and does not settle, where the robot is more than `LOST_M`
+A run settles if it is within 3 cm and 0.15 rad for its whole last second. A set settles from a start if 80 % of its
+runs do; in steps 1 to 3 it leaves a start as soon as that is out of reach. A run ends, and does not settle,
+where the robot is more than `LOST_M`
 off its reference: little of 6 s is left to come back, and a picture without a robot is slow to search. Sets are
 compared by their cost, the mean over all seeds: of a run that settles its error, of any other between `MISSED_CM` and
 `LOST_CM`, the more the farther off it ends, so that a search that settles nowhere yet has a direction. A seed that was
@@ -268,14 +269,16 @@ def _runs(start: Start, task: Task) -> Iterator[Outcome]:
 def outcome_of(world: World) -> Outcome:
     """Errors are of the position; over the last second, root mean square."""
     squares: list[float] = []
-    distance_m = heading_rad = 0.0
+    distance_m, inside = 0.0, 0  # periods in a row within the limits
     while not world.finished:
         robot = world.step().robots[0]
         distance_m, heading_rad = _off(robot.truth, robot.reference)
+        within = 100.0 * distance_m <= SETTLED_CM and heading_rad <= SETTLED_RAD
+        inside = inside + 1 if within else 0
         if distance_m > LOST_M:
             break
         squares.append(distance_m * distance_m)
-    if 100.0 * distance_m > SETTLED_CM or heading_rad > SETTLED_RAD:
+    if inside < LAST_SECOND:
         return Outcome(False, 100.0 * distance_m)
     last = squares[-LAST_SECOND:]
     return Outcome(True, 100.0 * math.sqrt(math.fsum(last) / len(last)))
@@ -426,8 +429,8 @@ three forms of epsilon-tracking get the same search: {explored} gain sets drawn 
 `1997`, radio, firmware, LM629, motors) from the starts of the paper's Figs. 6 to 10. The paper's law has
 {papers} gains to search for, epsilon-tracking {fewest} or {most}; the number of sets is the same.
 
-A run *settles* if it ends within 3 cm and 0.15 rad. A set settles from a start if {enough:.0f} % of its runs do. A run
-that is more than {lost:g} m off its reference is over.
+A run *settles* if it is within 3 cm and 0.15 rad for its whole last second. A set settles from a start if
+{enough:.0f} % of its runs do. A run that is more than {lost:g} m off its reference is over.
 
 ## How many gain sets settle
 

@@ -32,7 +32,7 @@ from mirotwin.recording.theory.figures import (
     DisturbanceFigures,
     Theory,
 )
-from mirotwin.recording.track import Tracks
+from mirotwin.recording.track import Tracks, settled
 from mirotwin.runs.board_summary import AnySummary, BoardSummary, SerialFigures
 from mirotwin.runs.summary import FirmwareCounts, LinkCounts, Summary, Tracking, VisionCounts, tracking_of
 
@@ -106,13 +106,13 @@ def _of_parts(parts: Sequence[_Part]) -> dict[str, _Column]:
 _SIMULATED: dict[str, _Column] = {"simulated_s": (float, lambda run: run.summary.simulated_s)}
 COLUMNS: Mapping[str, _Column] = {
     **_SIMULATED,
-    "settled": (bool, lambda run: None if run.first is None else run.first.errors[-1].settled),
+    "settled": (bool, lambda run: None if run.first is None else settled(run.first.errors)),
     "worst_rms_position_cm": (float, _Run.worst_rms_position_cm),
     **{name: (float, _at("seen", name.replace("seen_", "rms_"))) for name in SEEN},
     **_of_parts(_PARTS),
 }
 """Name -> int, float or bool, and the value in one run: None where it has none. `settled`: the first robot is within
-3 cm and 0.15 rad at the end. `worst_rms_position_cm`: the largest `rms_position_cm` of all robots."""
+3 cm and 0.15 rad for the whole last second. `worst_rms_position_cm`: the largest `rms_position_cm` of all robots."""
 FIGURES: Mapping[str, type] = {name: kind for name, (kind, _) in COLUMNS.items()}
 BOARD_COLUMNS: Mapping[str, _Column] = {**_SIMULATED, **_of_parts(_BOARD_PARTS)}
 """Name -> type, and the value in one run of a board, as in `COLUMNS`."""

@@ -1,7 +1,7 @@
 """Rows of a results file as columns of numbers: what statistics are made from.
 
 Besides the figures of a run there are shares, 1 for a run of which it is true and 0 for another one: `failed`, `fault`,
-`error`, `unsettled` (not within 3 cm and 0.15 rad at the end), and `check.NAME` (that check failed).
+`error`, `unsettled` (not within 3 cm and 0.15 rad for the whole last second), and `check.NAME` (that check failed).
 """
 
 from __future__ import annotations

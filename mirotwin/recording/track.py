@@ -17,7 +17,7 @@ from typing import Any, TypeAlias
 
 import msgspec
 
-from miro_exact.clock import CONTROL_PERIOD_TICKS, seconds
+from miro_exact.clock import CONTROL_PERIOD_TICKS, TICKS_PER_SECOND, seconds
 from miro_host.eye.track import Sighting
 from miro_host.posture import Posture
 from miro_sim.periods import Period, RobotId, RobotPeriod
@@ -53,7 +53,7 @@ class ErrorSample(msgspec.Struct, frozen=True):
         return math.sqrt(self.x_cm * self.x_cm + self.y_cm * self.y_cm)
 
     @property
-    def settled(self) -> bool:
+    def within_limits(self) -> bool:
         """Within 3 cm and 0.15 rad."""
         return self.position_cm <= SETTLED_CM and abs(self.theta_rad) <= SETTLED_RAD
 
@@ -80,6 +80,16 @@ class TrackingErrors(Sequence[ErrorSample]):
             return [self[at] for at in range(*index.indices(len(self)))]
         error = self.x_cm[index], self.y_cm[index], self.theta_rad[index]
         return ErrorSample(self.ticks[index], *error, bool(self.off_pitch[index]))
+
+
+def last_second(samples: Sequence[ErrorSample]) -> Sequence[ErrorSample]:
+    """The samples of the last second of a run that has some; all, if it is shorter."""
+    return [sample for sample in samples if sample.tick > samples[-1].tick - TICKS_PER_SECOND]
+
+
+def settled(samples: Sequence[ErrorSample]) -> bool:
+    """Whether a robot has settled: it was within 3 cm and 0.15 rad for the whole last second of the run."""
+    return all(sample.within_limits for sample in last_second(samples))
 
 
 class Postures:

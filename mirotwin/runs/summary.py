@@ -12,7 +12,7 @@ from miro_exact import engine
 from miro_exact.bad_input import amount
 from miro_exact.clock import CONTROL_PERIOD_TICKS, TICKS_PER_SECOND, seconds
 from mirotwin.recording.theory.figures import SlidingGains, Theory, gains_of, rms, theory_of
-from mirotwin.recording.track import ErrorSample, Tracks
+from mirotwin.recording.track import ErrorSample, Tracks, last_second, settled
 from mirotwin.runs.learnt import LearntCalibration, LearntWheels
 from mirotwin.shell.json_text import json_bytes
 from mirotwin.verify.checks.interface import Expectation
@@ -26,7 +26,7 @@ class Tracking(msgspec.Struct, frozen=True):
 
     `rms_*`: root mean square over the last second of the run (all of it, if shorter), one value a control
     period; position is the distance. `settling_s`: the last time at which the robot was outside 3 cm or
-    0.15 rad; 0 if it never was, None if it is outside at the end of the run: it never settled. `off_pitch_s`: how long
+    0.15 rad; 0 if it never was, None if it was so within the last second: it has not settled. `off_pitch_s`: how long
     a corner of the robot's square was beyond the edge of the pitch, in whole control periods.
     """
 
@@ -163,7 +163,7 @@ def tracking_of(samples: Sequence[ErrorSample]) -> Tracking:
     """The figures of one robot; None throughout when there is no sample."""
     if not samples:
         return Tracking(None, None, None, None, None, None)
-    last = _last_second(samples)
+    last = last_second(samples)
     return Tracking(
         rms_x_cm=rms([sample.x_cm for sample in last]),
         rms_y_cm=rms([sample.y_cm for sample in last]),
@@ -176,21 +176,17 @@ def tracking_of(samples: Sequence[ErrorSample]) -> Tracking:
 
 def rms_name(samples: Sequence[ErrorSample]) -> str:
     """What `rms_*` of these samples are, for people: with the times, where they cover less than a second."""
-    last = _last_second(samples)
+    last = last_second(samples)
     from_tick, to_tick = last[0].tick, last[-1].tick + CONTROL_PERIOD_TICKS
     if to_tick - from_tick >= TICKS_PER_SECOND:
         return "rms of the last second"
     return f"rms ({seconds(from_tick):.2f} s to {seconds(to_tick):.2f} s)"
 
 
-def _last_second(samples: Sequence[ErrorSample]) -> Sequence[ErrorSample]:
-    return [sample for sample in samples if sample.tick > samples[-1].tick - TICKS_PER_SECOND]
-
-
 def _settling_s(samples: Sequence[ErrorSample]) -> float | None:
-    if not samples[-1].settled:
+    if not settled(samples):
         return None
-    outside = [sample.tick for sample in samples if not sample.settled]
+    outside = [sample.tick for sample in samples if not sample.within_limits]
     return seconds(outside[-1]) if outside else 0.0
 
 

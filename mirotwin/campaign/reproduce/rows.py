@@ -16,8 +16,8 @@ class RunRow(msgspec.Struct, frozen=True):
     """What the first robot of a run did; `error` says why there is nothing else.
 
     `rms_*`: root mean square over the last second, truth against reference; `seen_*`: measurement against the reference
-    at its exposure (None, if the robot was not seen in that second). `settling_s` as in summary.json; `settled` at the
-    end of the run. The last five: `recording.theory.figures`, None or 0 where no
+    at its exposure (None, if the robot was not seen in that second). `settling_s` as in summary.json; `settled`: within
+    3 cm and 0.15 rad for the whole last second. The last five: `recording.theory.figures`, None or 0 where no
     host steered it.
     """
 
@@ -101,10 +101,10 @@ def middle_seeds(table: Table) -> dict[str, int]:
 
 
 def never_settled(rows: Sequence[RunRow]) -> int:
-    """Runs that end outside of 3 cm or 0.15 rad, and runs that failed."""
+    """Runs that were outside of 3 cm or 0.15 rad within the last second, and runs that failed."""
     return sum(not row.settled for row in rows)
 
 
 def settled(rows: Sequence[RunRow]) -> list[RunRow]:
-    """Runs that end within 3 cm and 0.15 rad. Errors of the others say only how far they got in 6 s."""
+    """Runs that were within 3 cm and 0.15 rad for the last second. Errors of others say how far they got."""
     return [row for row in rows if row.settled]
