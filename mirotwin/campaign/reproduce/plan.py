@@ -22,7 +22,10 @@ LEARNING = "improved, learning"
 ILLUSTRATIVE = "epsilon, illustrative"
 THEORY = "epsilon, theory"
 RETUNED = "epsilon, retuned"
-EPSILONS = (ILLUSTRATIVE, THEORY, RETUNED)
+LINE = "epsilon, line"
+EPSILONS = (ILLUSTRATIVE, THEORY, RETUNED, LINE)
+RIVALS = (RETUNED, LINE)
+"""Sets of gains of the other law that were found for this loop: by one search, and by others for the line alone."""
 
 
 class Start(msgspec.Struct, frozen=True):
@@ -66,13 +69,17 @@ SETTINGS: Mapping[str, tuple[str, ...]] = {
         for gain in ("epsilon_rad", "alpha_per_s", "beta_per_s", "length_m", "sigma", "switching")
     ),
     RETUNED: ("network.robot.controller={law = 'epsilon_tracking'}",),  # the defaults of the law
+    LINE: (
+        "network.robot.controller={law = 'epsilon_tracking', epsilon_rad = 0.0177, alpha_per_s = 7.36,"
+        " length_m = 0.211, beta_per_s = 6.71, layer_sigma_rad2 = 0.0642, max_v_m_s = 0.218, max_w_rad_s = 1.55}",
+    ),
     IMPROVED: IMPROVED_SETTINGS,
     LEARNING: (*IMPROVED_SETTINGS, "camera.self_calibration=lines"),
 }
 """Settings of each controller; one without gains takes those of the scenario."""
 CONTROLLERS = tuple(SETTINGS)
 CAMERAS = {"white noise": "camera={kind = 'gaussian'}", "pixels, exact": "camera.calibration=exact"}
-"""Other cameras than that of the scenarios, which is `1997`; for Figs. 6 to 8."""
+"""Other cameras than that of the scenarios, which is `1997`."""
 DISTURBANCES = {
     "integration of second order": ("host.integration=adams_bashforth",),
     "words of 8 bits": ("host.word_bits=8",),
@@ -127,14 +134,17 @@ class RunGroup(msgspec.Struct, frozen=True):
         return base, tuple(settings)
 
 
+LOST = RunGroup(STARTS[1], ILLUSTRATIVE, "white noise")
+"""From the start of Fig. 7 this one drives out of the camera's view: a camera that sees everywhere is beside it."""
 GROUPS = (
     *(RunGroup(start, controller) for start in STARTS for controller in CONTROLLERS),
     *(
         RunGroup(start, controller, camera)
-        for start in STARTS[:3]
-        for controller in (PAPER, IMPROVED)
+        for start in STARTS
+        for controller in (PAPER, *RIVALS, IMPROVED)
         for camera in CAMERAS
     ),
+    LOST,
     *(RunGroup(start, PAPER, "", disturbance) for start in STARTS[:3] for disturbance in DISTURBANCES),
 )
 

@@ -9,6 +9,7 @@ from typing import Any
 import msgspec
 
 from mirotwin.campaign.plan import Plan
+from mirotwin.campaign.reproduce.plan import STARTS, RunGroup
 from mirotwin.campaign.worker import RunOutcome
 
 
@@ -17,7 +18,8 @@ class RunRow(msgspec.Struct, frozen=True):
 
     `rms_*`: root mean square over the last second, truth against reference; `seen_*`: measurement against the reference
     at its exposure (None, if the robot was not seen in that second). `settling_s` as in summary.json; `settled`: within
-    3 cm and 0.15 rad for the whole last second. The last five: `recording.theory.figures`, None or 0 where no
+    3 cm and 0.15 rad for the whole last second. `vision_*`: frames, and
+    those in which a robot was not found. The last five: `recording.theory.figures`, None or 0 where no
     host steered it.
     """
 
@@ -38,6 +40,8 @@ class RunRow(msgspec.Struct, frozen=True):
     settled: bool = False
     off_pitch_s: float | None = None
     faults: int = 0
+    vision_frames: int = 0
+    vision_lost: int = 0
     reversals: int = 0
     backward_s: float = 0.0
     crossings: int = 0
@@ -62,6 +66,14 @@ def row_of(plan: Plan, outcome: RunOutcome) -> RunRow:
 
 Table = Mapping[str, Sequence[RunRow]]
 """Rows by the label of their group, in the order of the seeds."""
+
+
+def rows_of(
+    table: Table, figure: int, controller: str, camera: str = "", disturbance: str = ""
+) -> Sequence[RunRow]:
+    """The rows of one group; none, if it was not run."""
+    start = next(start for start in STARTS if start.figure == figure)
+    return table.get(RunGroup(start, controller, camera, disturbance).label, ())
 
 
 def by_label(rows: Iterable[RunRow]) -> dict[str, list[RunRow]]:

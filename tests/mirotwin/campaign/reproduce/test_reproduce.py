@@ -1,7 +1,9 @@
 """The paper's section V again: verdicts follow from rows, and the page is the same however it was made."""
 
 import csv
+import re
 import string
+from pathlib import Path
 
 import msgspec
 import pytest
@@ -10,9 +12,20 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from miro_sim.scenario.file import load
+from mirotwin.campaign.design import Level
+from mirotwin.campaign.plan import plan_of_levels
 from mirotwin.campaign.reproduce import rows as run_rows
+from mirotwin.campaign.reproduce.better import (
+    ALL_CAMERAS,
+    ERRORS,
+    NEITHER,
+    OURS,
+    THEIRS,
+    camera_name,
+    compare,
+)
 from mirotwin.campaign.reproduce.claims import HOLDS, NOT, NOT_JUDGED, PART, findings
-from mirotwin.campaign.reproduce.page import page
+from mirotwin.campaign.reproduce.page import OPPOSITE, page
 from mirotwin.campaign.reproduce.plan import (
     CONTROL_NOISE,
     DISTURBANCES,
@@ -20,15 +33,18 @@ from mirotwin.campaign.reproduce.plan import (
     GROUPS,
     IMPROVED,
     LEARNING,
+    LINE,
     PAPER,
     RETUNED,
+    RIVALS,
     STARTS,
     RunGroup,
     plan_of,
     recorded,
 )
 from mirotwin.campaign.reproduce.reproduce_command import _failures
-from mirotwin.campaign.reproduce.rows import RunRow, middle_seeds, row_of
+from mirotwin.campaign.reproduce.rows import RunRow, by_label, middle_seeds, row_of
+from mirotwin.campaign.single import run_single
 from mirotwin.campaign.worker import RunOutcome
 from mirotwin.commands import main
 
@@ -75,8 +91,14 @@ def noisy(figure, disturbance):
 
 
 def of_epsilon(*figures, **values):
-    names = ("illustrative", "theory", "retuned")
+    names = ("illustrative", "theory", "retuned", "line")
     return {f"fig{figure}_epsilon_{name}": values for figure in figures for name in names}
+
+
+def of_rivals():
+    """Rows of all rivals that are worse, under each camera."""
+    groups = [group for group in GROUPS if group.controller in RIVALS]
+    return {key(group.label): {"rms_position_cm": 5.0, "seen_position_cm": 5.0} for group in groups}
 
 
 FAR = {"rms_position_cm": 2.5}
@@ -114,31 +136,106 @@ LOST_ON_9 = {"fig9_paper": {"settled": False, "rms_position_cm": 130.0, "chatter
         ("control signal", {}, HOLDS),
         ("control signal", {noisy(n, CONTROL_NOISE[1]): {"settled": False} for n in (6, 7, 8)}, PART),
         ("control signal", {noisy(n, one): FAR for n in (6, 7, 8) for one in CONTROL_NOISE}, NOT),
+        ("superior", {}, NOT),
         ("superior", {"fig9_epsilon_retuned": {"rms_position_cm": 5.0}}, PART),
-        ("superior", {f"fig{n}_epsilon_retuned": {"rms_position_cm": 5.0} for n in (6, 7, 8, 9, 10)}, HOLDS),
+        ("superior", of_rivals(), HOLDS),
+        ("superior", of_rivals() | {"fig6_epsilon_line_white_noise": {}}, PART),
     ],
 )
 def test_a_verdict_follows_from_the_rows(words, changes, expected):
     assert finding(words, **changes).verdict == expected
 
 
-def test_the_page_says_which_law_is_better_by_which_error():
-    """The reverse may hold as the camera sees it."""
+def compared(rival=RETUNED, camera="", error="truth", **changes):
+    return compare(table(**changes), 6, rival, camera, error)
+
+
+@pytest.mark.parametrize(
+    ("theirs", "verdict"),
+    [
+        ({"rms_position_cm": 1.5}, OURS),
+        ({"rms_position_cm": 0.5}, THEIRS),
+        ({}, NEITHER),
+        ({"settled": False}, OURS),
+        ({"settled": False, "rms_position_cm": 0.1}, OURS),
+    ],
+)
+def test_the_better_law_settles_more_often_or_is_nearer_in_nearly_all_pairs(theirs, verdict):
+    found = compared(fig6_epsilon_retuned=theirs)
+    assert (found.verdict, found.by_settled) == (verdict, "settled" in theirs)
+    assert compared(error="camera", fig6_epsilon_retuned={"rms_position_cm": 9.0}).verdict == NEITHER
+    assert compared(camera="white noise", fig6_epsilon_retuned=theirs).verdict == NEITHER
+
+
+def test_a_difference_that_some_pairs_do_not_show_is_none():
+    rows = table(fig6_epsilon_retuned={"rms_position_cm": 1.5})
+    label = "fig6-epsilon-retuned"
+    rows[label][:5] = [msgspec.structs.replace(row, rms_position_cm=0.9) for row in rows[label][:5]]
+    found = compare(rows, 6, RETUNED, "", "truth")
+    assert (found.verdict, found.nearer.low < 0.0 < found.nearer.high) == (NEITHER, True)
+
+
+def test_laws_that_do_not_settle_are_not_judged_by_their_errors():
+    neither = {"settled": False}
+    found = compared(fig6_epsilon_retuned=neither, fig6_paper=neither)
+    assert (found.verdict, found.pairs, found.settled) == ("not judged", 0, (0, 0))
+
+
+@given(st.permutations(range(20)))
+def test_pairs_are_of_the_same_seed_in_whatever_order_they_come(order):
+    rows = table()
+    for label, first in (("fig6-paper", 1.0), ("fig6-epsilon-retuned", 1.2)):
+        rows[label] = [msgspec.structs.replace(row, rms_position_cm=first + row.seed) for row in rows[label]]
+    rows["fig6-paper"] = [rows["fig6-paper"][place] for place in order]
+    assert compare(rows, 6, RETUNED, "", "truth").verdict == OURS
+
+
+def test_the_page_opens_with_the_errors_that_rank_the_laws_oppositely():
     changes = {
         f"fig{n}_epsilon_retuned": {"rms_position_cm": 2.0, "seen_position_cm": 0.3} for n in range(6, 11)
     }
-    text = page(table(**changes, fig9_paper={"settled": False}), "0 to 19", "reproduction")
-    section = text.partition("## Which of the two laws is better")[2].partition("\n## ")[0]
-    assert "error from 4 of 4 starts in truth, from 0 of 4 starts as the camera sees it" in section
-    none = "not judged: 0 of 20 / 20 of 20 settle"
-    assert (
-        f"| in truth, runs that settle | 1.00 / 2.00 | 1.00 / 2.00 | 1.00 / 2.00 | {none} | 1.00 / 2.00 |"
-        in section
-    )
-    assert (
-        f"| as the camera sees it, runs that settle | 0.90 / 0.30 | 0.90 / 0.30 | 0.90 / 0.30 | {none} | 0.90 / 0.30 |"
-        in section
-    )
+    text = " ".join(page(table(**changes, fig9_paper={"settled": False}), "0 to 19", "reproduction").split())
+    assert OPPOSITE in text
+    assert "with `pixels, 1997` from 4 / 1 in truth and 0 / 5 as the camera sees it" in text
+    one = "1.00 / 2.00, **paper** by 1.00 to 1.00"
+    far = "0 / 20 of 20 settle: **epsilon**"
+    assert f"| pixels, 1997 | truth | {one} | {one} | {one} | {far} | {one} |" in text
+    one = "0.90 / 0.30, **epsilon** by 0.60 to 0.60"
+    assert f"| pixels, 1997 | camera | {one} | {one} | {one} | {far} | {one} |" in text
+    assert OPPOSITE not in page(table(), "0 to 19", "reproduction")
+
+
+def test_too_few_seeds_give_medians_and_no_verdict():
+    rows = {label: rows[:5] for label, rows in table(fig6_epsilon_retuned={"rms_position_cm": 9.0}).items()}
+    text = page(rows, "0 to 4", "reproduction")
+    assert "| pixels, 1997 | truth | 1.00 / 9.00, not judged: 5 / 5 of 5 settle |" in text
+
+
+PAGE = Path(__file__).parents[4] / "docs/reproduction.md"
+WORDS = re.compile(r"\*\*(paper|epsilon)\*\*")
+
+
+@pytest.mark.parametrize("camera", ALL_CAMERAS)
+def test_twenty_seeds_of_the_gains_for_the_line_agree_with_the_verdicts_of_the_page(camera):
+    """The law that the paper's is said to be better than wins on the line, but for the truth under a biased camera."""
+    starts = [start for start in STARTS if start.figure in (6, 7, 9)]
+    groups = [RunGroup(start, one, camera) for start in starts for one in (PAPER, LINE)]
+    levels = [Level(group.label, group.scenario()[1], group.scenario()[0]) for group in groups]
+    plan = plan_of_levels("line", levels, range(20))
+    rows = by_label(row_of(plan, run_single(plan.work(run))) for run in range(plan.runs))
+    section = PAGE.read_text().partition(f"### The paper's law beside {LINE}")[2].partition("\n#")[0]
+    for error in ERRORS:
+        (line,) = [
+            line for line in section.splitlines() if line.startswith(f"| {camera_name(camera)} | {error} |")
+        ]
+        for start in starts:
+            cell = line.split("|")[3 + STARTS.index(start)]
+            found = compare(rows, start.figure, LINE, camera, error)
+            said = WORDS.search(cell)
+            # with fewer seeds some differences are no longer beyond chance, but none is turned round
+            assert found.verdict in ({said[1], NEITHER} if said else {NEITHER}), (start.figure, error, cell)
+            if found.pairs:
+                assert (found.ours_cm < found.theirs_cm) == (not said or said[1] == OURS)
 
 
 def test_of_rows_that_are_not_there_nothing_holds():
@@ -258,7 +355,7 @@ def few(monkeypatch):
 
     def short(group):
         name, settings = whole(group)
-        return name, (*settings, "duration_s=2.5")
+        return name, (*settings, "duration_s=3.5")
 
     monkeypatch.setattr(RunGroup, "scenario", short)
     groups = tuple(
