@@ -8,7 +8,9 @@ Medians over seeds from 0; for each |f_i| the root mean square over a run.
 import argparse
 import math
 import statistics
+from functools import cache
 from itertools import pairwise
+from typing import NamedTuple
 
 from rich.console import Console
 from rich.table import Table
@@ -29,9 +31,9 @@ RUNS = {
     "fig8, body_frame and predict": ("fig8", BODY),
 }
 COLUMNS = (
-    *("run", "f1 m/s2 (a period later)", "P1: |f1| above / above P1 |sat s1|"),
-    *("f2 rad/s2 (..)", "P2: |f2| above / above P2 |sat s2|"),
-    *("near / across", "reversals / back", "chattering m/s2"),
+    *("run", "f1 rms, m/s2", "|f1| > P1; > P1 |sat s1|"),
+    *("f2 rms, rad/s2", "|f2| > P2; > P2 |sat s2|"),
+    *("frames near across / crossings", "reversals / backward", "chattering, m/s2"),
 )
 
 
@@ -55,33 +57,71 @@ def run(name, seed):
     return theory_of(tracks.robots[0, 0].theory, gains_of(world.scenario)[0, 0]), late
 
 
-def of_disturbance(name):
-    """A figure of f."""
-    return lambda theory, _: getattr(theory.disturbance, name)
+class Medians(NamedTuple):
+    """Of the runs of one kind. Shares of frames are 0 to 1, None for a law without P."""
+
+    f1_m_s2: float
+    f1_late_m_s2: float
+    f2_rad_s2: float
+    f2_late_rad_s2: float
+    p1_m_s2: float | None
+    p2_rad_s2: float | None
+    f1_above_p1: float | None
+    f1_above_authority: float | None
+    f2_above_p2: float | None
+    f2_above_authority: float | None
+    near: float
+    crossings: float
+    reversals: float
+    backward_s: float
+    chattering_m_s2: float
+
+
+@cache
+def medians(name, seeds):
+    """Medians of the runs of one kind."""
+    found = [run(name, seed) for seed in range(seeds)]
+
+    def median(value):
+        values = [value(theory, late) for theory, late in found]
+        return None if None in values else statistics.median(values)
+
+    def of_disturbance(name):
+        return median(lambda theory, _: getattr(theory.disturbance, name))
+
+    return Medians(
+        f1_m_s2=of_disturbance("f1_rms_m_s2"),
+        f1_late_m_s2=median(lambda _, late: late[0]),
+        f2_rad_s2=of_disturbance("f2_rms_rad_s2"),
+        f2_late_rad_s2=median(lambda _, late: late[1]),
+        p1_m_s2=found[0][0].disturbance.p1_m_s2,
+        p2_rad_s2=found[0][0].disturbance.p2_rad_s2,
+        **{one: of_disturbance(one) for one in Medians._fields[6:10]},
+        near=median(lambda theory, _: theory.assumption_3.frames),
+        crossings=median(lambda theory, _: theory.assumption_3.crossings),
+        reversals=median(lambda theory, _: theory.reversals),
+        backward_s=median(lambda theory, _: theory.backward_s),
+        chattering_m_s2=median(lambda theory, _: theory.chattering_m_s2),
+    )
 
 
 def row(name, seeds):
     """The cells of the table."""
-    found = [run(name, seed) for seed in range(seeds)]
+    m = medians(name, seeds)
 
-    def median(value):
-        return statistics.median(value(theory, late) for theory, late in found)
-
-    def shares(*names):
-        """Above the gain / above what the layer leaves of it; a dash for a law that has none."""
-        if getattr(found[0][0].disturbance, names[0]) is None:
-            return "-"
-        return " / ".join(f"{100 * median(of_disturbance(name)):.0f} %" for name in names)
+    def above(p, alone, left):
+        """Above the gain, and above what the layer leaves of it; a dash for a law that has none."""
+        return "-" if alone is None else f"{100 * alone:.0f} % of {p:g}; {100 * left:.0f} %"
 
     return (
         name,
-        f"{median(lambda t, _: t.disturbance.f1_rms_m_s2):.3f} ({median(lambda _, late: late[0]):.3f})",
-        f"{found[0][0].disturbance.p1_m_s2 or 0:g}: {shares('f1_above_p1', 'f1_above_authority')}",
-        f"{median(lambda t, _: t.disturbance.f2_rms_rad_s2):.2f} ({median(lambda _, late: late[1]):.2f})",
-        f"{found[0][0].disturbance.p2_rad_s2 or 0:g}: {shares('f2_above_p2', 'f2_above_authority')}",
-        f"{median(lambda t, _: t.assumption_3.frames):g} / {median(lambda t, _: t.assumption_3.crossings):g}",
-        f"{median(lambda t, _: t.reversals):g} / {median(lambda t, _: t.backward_s):.2f} s",
-        f"{median(lambda t, _: t.chattering_m_s2):.3f}",
+        f"{m.f1_m_s2:.3f} ({m.f1_late_m_s2:.3f})",
+        above(m.p1_m_s2, m.f1_above_p1, m.f1_above_authority),
+        f"{m.f2_rad_s2:.2f} ({m.f2_late_rad_s2:.2f})",
+        above(m.p2_rad_s2, m.f2_above_p2, m.f2_above_authority),
+        f"{m.near:g} / {m.crossings:g}",
+        f"{m.reversals:g} / {m.backward_s:.2f} s",
+        f"{m.chattering_m_s2:.3f}",
     )
 
 

@@ -19,7 +19,13 @@ from miro_host.references.arc import StraightLine
 from mirotwin.recording.theory.track import across, radius
 from tests.host.theory.paper_law import YangKim
 
-NO_GUARD = Gains(cosine_guard=1e-9, rho_floor_m=1e-9)
+
+def unguarded(gains):
+    """The gains without what the law does near the origin and near assumption 3, which is not in the paper."""
+    return msgspec.structs.replace(gains, cosine_guard=1e-9, rho_floor_m=1e-9)
+
+
+NO_GUARD = unguarded(Gains())
 SLOPED = msgspec.structs.replace(NO_GUARD, layer_derivative=True)
 
 
