@@ -1,6 +1,7 @@
 """What a release is made of: its versions and files, the bounds that CI holds, the workflows that build and publish."""
 
 import datetime
+import json
 import re
 import sys
 import tomllib
@@ -24,6 +25,15 @@ CONSTRAINTS = (ROOT / ".ci" / "constraints.txt").read_text(encoding="utf-8")
 WORKFLOWS = {path.name: path for path in sorted((ROOT / ".github" / "workflows").glob("*.yml"))}
 PINNED = re.compile(r"[\w.-]+/[\w./-]+@(v\d+(\.\d+)*|[0-9a-f]{40})")
 FILE_OF_THE_TREE = re.compile(r"(?:\{project\}/)?\b((?:tests|docs|benchmarks|examples)/[\w./-]+\.\w+)")
+
+
+def test_the_digest_that_is_cited_as_an_example_is_that_of_the_run():
+    page = (ROOT / "docs/howto/reproduce.md").read_text(encoding="utf-8")
+    (cited,) = re.findall(
+        r"Mirotwin ([0-9.]+), commit .*, `mirotwin run fig6 --seed 7`,\n> digest ([0-9a-f]{12})\n", page
+    )
+    digests = json.loads((ROOT / "tests/vectors/digests.json").read_text(encoding="utf-8"))
+    assert cited == (CITATION["version"], digests["fig6 6 s seed 7"][:12])
 
 
 def releases():

@@ -10,8 +10,9 @@ control period in which a posture is known:
                                             └─► inner values, for the recording only
 
 The mistake that this design prevents is memory outside the saved state: a law keeps what it remembers in attributes
-that `STATE` declares, and an attribute that is declared nowhere is refused. A law sees what the PC could have seen. It
-has no access to the true posture of a robot.
+that `STATE` declares, and an attribute that is declared nowhere is refused. A law is given what the PC could have seen,
+and no true posture of a robot. No wall keeps it from looking further, since it runs in the same process: whoever checks
+a law reads its source.
 """
 
 from collections.abc import Mapping

@@ -1,5 +1,7 @@
 """Quantiles, bootstrap intervals and paired differences: those of their definitions, digit for digit."""
 
+import itertools
+
 import mpmath
 import numpy as np
 import pytest
@@ -8,7 +10,17 @@ from hypothesis import strategies as st
 
 from benchmarks.intervals import coverage
 from mirotwin.campaign.comparison import MetricDifference
-from mirotwin.campaign.statistics import FEWEST, Interval, draws, figures, mean, quantile, student
+from mirotwin.campaign.statistics import (
+    FEWEST,
+    Interval,
+    draws,
+    figures,
+    mean,
+    quantile,
+    rank_interval,
+    sign_test,
+    student,
+)
 from tests.naive import bootstrap
 
 NUMBERS = st.lists(st.floats(-1e6, 1e6), min_size=1, max_size=12)
@@ -76,6 +88,39 @@ def test_intervals_hold_what_they_should_where_scenarios_of_a_seed_are_correlate
     found = coverage(samples=20, correlation=0.95, trials=1000)
     assert 0.93 <= found.mean <= 0.97
     assert found.by_pairs < 0.7
+
+
+def test_where_a_few_runs_are_lost_the_interval_of_the_median_holds_and_that_of_the_mean_does_not():
+    found = coverage(samples=50, scenarios=1, correlation=0.0, trials=60, kind="runaway", medians=True)
+    assert found.mean < 0.8
+    assert found.median > 0.88
+
+
+@given(st.integers(0, 6), st.integers(0, 6))
+def test_the_sign_test_counts_all_ways_in_which_the_signs_may_fall(lower, higher):
+    count, split = lower + higher, abs(lower - higher)
+    ways = list(itertools.product((-1, 1), repeat=count))
+    as_uneven = [way for way in ways if abs(sum(way)) >= split]
+    assert sign_test(lower, higher) == pytest.approx(len(as_uneven) / len(ways))
+
+
+NONZERO = st.floats(-10.0, 10.0).filter(lambda number: number != 0.0)
+
+
+@given(st.lists(NONZERO, min_size=1, max_size=60), st.sampled_from([0.9, 0.95, 0.999]))
+def test_zero_is_outside_of_the_interval_of_the_median_where_the_sign_test_says_so(numbers, confidence):
+    interval = rank_interval(np.array(numbers), confidence)
+    lower = len([number for number in numbers if number < 0.0])
+    decided = sign_test(lower, len(numbers) - lower) <= 1.0 - confidence
+    assert decided == (interval is not None and not interval.low <= 0.0 <= interval.high)
+    if interval is not None:
+        assert interval.low <= quantile(np.sort(numbers), 0.5) <= interval.high
+
+
+def test_the_interval_of_the_median_of_fifty_numbers_is_from_the_eighteenth_to_the_thirty_third():
+    """As in tables of the binomial: P(B < 18) = 0.0164 for B of 50, P(B < 19) = 0.0325."""
+    assert rank_interval(np.arange(1.0, 51.0)) == Interval(18.0, 33.0)
+    assert rank_interval(np.arange(5.0)) is None
 
 
 def of(metric="rms_position_cm", first=2.0, low=0.1, high=0.3, **more):
