@@ -1,5 +1,8 @@
 """What all tests share: property tests without a time limit, and a garbage collector that passes over what stays.
 
+Property tests take the same examples each time, so that a test that is red is red for everybody, and since the change
+that made it so. `--hypothesis-profile=long` takes new ones, and ten times as many.
+
 On a busy machine any example may be slow. Each process holds some 800,000 objects once it has collected the tests, all
 of which stay until its end. Each full collection would walk through them; a pytest session in this process makes ten.
 """
@@ -9,10 +12,15 @@ import sys
 
 from hypothesis import HealthCheck, settings
 
-settings.register_profile("untimed", deadline=None)
+settings.register_profile("untimed", deadline=None, derandomize=True)
 settings.load_profile("untimed")
 settings.register_profile(
-    "long", deadline=None, max_examples=1000, print_blob=True, suppress_health_check=list(HealthCheck)
+    "long",
+    deadline=None,
+    derandomize=False,
+    max_examples=1000,
+    print_blob=True,
+    suppress_health_check=list(HealthCheck),
 )
 
 
