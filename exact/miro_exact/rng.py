@@ -57,20 +57,24 @@ class Stream:
     NOT_STATE = ("*",)
 
     def __init__(self, seed: int, name: str) -> None:
-        if not 0 <= seed <= MAX_SEED:
-            raise ValueError(f"seed {seed} is outside 0 .. {MAX_SEED}")
         tag = hashlib.sha256(name.encode()).digest()
-        self.seed = seed
         self.name = name
-        self.k0 = seed & 0xFFFFFFFF
-        self.k1 = seed >> 32
         self.name0 = int.from_bytes(tag[0:4], "little")
         self.name1 = int.from_bytes(tag[4:8], "little")
-        self.block = _NO_BLOCK
         self.words = [0] * 4
-        self.group = -1  # number of the 16 draws of `u32` that are in `draws`
         self.draws = [0] * 16
         self.least = 0  # of them
+        self.reseed(seed)
+
+    def reseed(self, seed: int) -> None:
+        """From now on the stream of this name of another master seed. Raises ValueError as a new one does."""
+        if not 0 <= seed <= MAX_SEED:
+            raise ValueError(f"seed {seed} is outside 0 .. {MAX_SEED}")
+        self.seed = seed
+        self.k0 = seed & 0xFFFFFFFF
+        self.k1 = seed >> 32
+        self.block = _NO_BLOCK  # what is cached is the old seed's
+        self.group = -1  # number of the 16 draws of `u32` that are in `draws`
 
     def __repr__(self) -> str:
         return f"Stream({self.seed}, {self.name!r})"

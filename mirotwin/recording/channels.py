@@ -21,9 +21,10 @@ from msgspec import Meta
 from msgspec.structs import astuple
 
 from miro_exact.clock import nanoseconds
+from miro_exact.domain import MAX_SEED
 from miro_host.eye.track import Sighting
 from miro_host.posture import Posture
-from miro_protocol.actions import PUT_PATH, Action, Power, Put, PutValue, RadioState, Reset
+from miro_protocol.actions import PUT_PATH, Action, Power, Put, PutValue, RadioState, Reseed, Reset
 from miro_protocol.stream import MAX_TICK
 from miro_protocol.transmission import DIRECTIONS, Transmission, check_bad_stop
 from miro_sim.periods import Axis, Control, RobotPeriod
@@ -255,15 +256,16 @@ class WireMessage(msgspec.Struct, frozen=True, gc=False):
 
 
 class ActionMessage(msgspec.Struct, frozen=True, gc=False):
-    """`actions`: what was done to a robot, or (`slot` -1) to the radio of the network.
+    """`actions`: what was done to a robot, or (`slot` -1) to the radio or the noise of the network.
 
-    `what` is "reset" or "power" with `value` 0 or 1, or the radio "up", "down" or "noise" from then on.
+    `what` is "reset" or "power" with `value` 0 or 1, the radio "up", "down" or "noise" from then on, or "reseed": from
+    then on the noise is that of seed `value`.
     """
 
     tick: int
     slot: int
-    what: Literal["reset", "power", "up", "down", "noise"]
-    value: Annotated[int, Meta(ge=0, le=1)] = 1
+    what: Literal["reset", "power", "up", "down", "noise", "reseed"]
+    value: Annotated[int, Meta(ge=0)] = 1
 
 
 class PutMessage(msgspec.Struct, frozen=True, gc=False):
@@ -329,6 +331,8 @@ def action_message(action: Action) -> ActionMessage | PutMessage:
         return PutMessage(action.tick, action.slot, action.path, action.value)
     if isinstance(action, RadioState):
         return ActionMessage(action.tick, -1, action.state)
+    if isinstance(action, Reseed):
+        return ActionMessage(action.tick, -1, "reseed", action.seed)
     if isinstance(action, Reset):
         return ActionMessage(action.tick, action.slot, "reset", action.level)
     return ActionMessage(action.tick, action.slot, "power", action.on)
@@ -336,12 +340,15 @@ def action_message(action: Action) -> ActionMessage | PutMessage:
 
 def action(network: int, message: ActionMessage) -> Action:
     """The action of a message. Raises ValueError for a message that cannot be."""
-    if not 0 <= message.tick <= MAX_TICK or message.slot < -1:
-        raise ValueError(f"{message.what} of robot {message.slot} at tick {message.tick}")
+    highest = MAX_SEED if message.what == "reseed" else 1
+    if not 0 <= message.tick <= MAX_TICK or message.slot < -1 or message.value > highest:
+        raise ValueError(f"{message.what} {message.value} of robot {message.slot} at tick {message.tick}")
     if message.what == "reset":
         return Reset(message.tick, network, message.slot, message.value)
     if message.what == "power":
         return Power(message.tick, network, message.slot, message.value)
+    if message.what == "reseed":
+        return Reseed(message.tick, network, message.value)
     return RadioState(message.tick, network, message.what)
 
 

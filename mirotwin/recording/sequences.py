@@ -6,7 +6,7 @@ from collections.abc import Iterator, Sequence
 from typing import Any, NamedTuple
 
 from miro_exact.clock import CONTROL_PERIOD_TICKS
-from miro_protocol.actions import Action, Put, RadioState, Reset
+from miro_protocol.actions import Action, Put, RadioState, Reseed, Reset
 from miro_protocol.transmission import DOWN, Transmission
 from miro_robot.lm629.commands import BY_OPCODE
 from miro_sim.periods import Period
@@ -69,6 +69,8 @@ def actions(periods: Sequence[Period], network: int) -> list[LogEntry]:
 def _action(action: Action) -> str:
     if isinstance(action, RadioState):
         return f"radio {action.state}"
+    if isinstance(action, Reseed):
+        return f"reseed {action.seed}"
     if isinstance(action, Put):
         return action.text
     name, level = ("reset", action.level) if isinstance(action, Reset) else ("power", action.on)

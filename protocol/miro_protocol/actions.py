@@ -46,6 +46,14 @@ class RadioState(msgspec.Struct, frozen=True):
     state: Literal["up", "down", "noise"]
 
 
+class Reseed(msgspec.Struct, frozen=True):
+    """`TICK *@N reseed SEED`: from then on a line has the noise of this seed; what is drawn once a seed is kept."""
+
+    tick: int
+    network: int
+    seed: int
+
+
 class PinLevel(msgspec.Struct, frozen=True):
     """`TICK * P1.0 0|1`: the level that is put on a port pin of a board alone; the same as `TICK * P1.0 = 0`."""
 
@@ -105,8 +113,8 @@ def _written(value: PutValue) -> str:
     return repr(value)
 
 
-Action = Reset | Power | RadioState | Put
-"""What somebody does to a robot, a radio or a part in a world."""
+Action = Reset | Power | RadioState | Put | Reseed
+"""What somebody does to a robot, a radio, a part or the noise in a world."""
 ScriptItem = Transmission | Action
 """What goes into a world from outside."""
 
@@ -120,6 +128,7 @@ WHO_CAN = {
     Reset: "`mirotwin replay` resets robots",
     Power: "`mirotwin replay` switches robots off and on",
     RadioState: "`mirotwin replay` switches radios off and on",
+    Reseed: "`mirotwin replay` gives lines the noise of another seed",
     Put: "`mirotwin replay` puts values of the parts of a board",
     PinLevel: "`mirotwin fw run --pins FILE` puts levels on the pins of a bare processor",
 }

@@ -5,11 +5,13 @@
     800000 *@1/2 reset 1           actions, see `actions.py`
     800000 *@1/2 power 0
     800000 *@1 radio down
+    800000 *@1 reseed 10042
     800000 * P1.0 0
     800000 * eyes.distance_cm = 60
     40ms > 55 55 ff 2d d4          a time with its unit is read, too: ticks are what is written
 
-Version 1 has characters of network 0 with good stop bits, and nothing else; version 2 does not put values of parts.
+Version 1 has characters of network 0 with good stop bits, and nothing else; version 2 neither puts values of parts nor
+gives a line the noise of another seed.
 """
 
 from __future__ import annotations
@@ -20,6 +22,7 @@ from reprlib import repr as brief
 
 from miro_exact.bad_input import BadInput
 from miro_exact.clock import TICKS_PER_SECOND
+from miro_exact.domain import MAX_SEED
 from miro_exact.times import tick_of
 from miro_protocol.actions import (
     PUT_PATH,
@@ -28,6 +31,7 @@ from miro_protocol.actions import (
     Power,
     Put,
     RadioState,
+    Reseed,
     Reset,
     ScriptItem,
     put_of,
@@ -55,10 +59,11 @@ _VERSION = re.compile(r"#\s*mirotwin stream\b\s*+(.*)")
 _TOKEN = re.compile(r"\S+")
 _CHARACTER = re.compile(r"([0-9a-fA-F]{2})(!?)")
 _PLACE = re.compile(r"([<>*])(?:@([0-9]{1,5})(?:/([0-9]{1,5}))?)?")
+_SEED = re.compile(r"[0-9]{1,19}")
 _PIN = re.compile(r"P[0-3]\.[0-7]")
 _ACTIONS = (
-    "write `*@N/SLOT reset 0|1`, `*@N/SLOT power 0|1`, `*@N radio up|down|noise`, `* P1.0 0|1`"
-    " or `* PART.KEY = VALUE`"
+    "write `*@N/SLOT reset 0|1`, `*@N/SLOT power 0|1`, `*@N radio up|down|noise`,"
+    " `*@N reseed SEED`, `* P1.0 0|1` or `* PART.KEY = VALUE`"
 )
 
 StreamItem = ScriptItem | PinLevel
@@ -75,7 +80,7 @@ class Entry:
 
 def version_of(what: StreamItem) -> int:
     """The first version that has words for it."""
-    if isinstance(what, Put):
+    if isinstance(what, Put | Reseed):
         return 3
     return 2 if not isinstance(what, Transmission) or what.network or what.bad_stop else 1
 
@@ -123,6 +128,9 @@ def _action(action: Action | PinLevel) -> str:
         _check("slot", action.slot, MAX_SLOT)
         _check("level", value, 1)
         return f"{HAND}@{action.network}/{action.slot} {word} {value}"
+    if isinstance(action, Reseed):
+        _check("seed", action.seed, MAX_SEED)
+        return f"{HAND}@{action.network} reseed {action.seed}"
     if action.state not in RADIO_STATES:
         raise ValueError(f"state = {action.state!r}: must be {', '.join(RADIO_STATES)}")
     return f"{HAND}@{action.network} radio {action.state}"
@@ -232,6 +240,12 @@ class StreamLine:
             return (Reset if word == "reset" else Power)(tick, network, slot, int(value))
         if word == "radio" and slot is None and network is not None and value in RADIO_STATES:
             return RadioState(tick, network, value)  # type: ignore[arg-type]
+        if word == "reseed" and slot is None and network is not None and _SEED.fullmatch(value):
+            if version < 3:
+                raise self._too_new(self.tokens[2], version, 3)
+            if int(value) > MAX_SEED:
+                raise self.error(self.tokens[3], f"seed {value}", f"there are seeds 0..{MAX_SEED}")
+            return Reseed(tick, network, int(value))
         if _PIN.fullmatch(word) and network is None and value in ("0", "1"):
             return PinLevel(tick, word, int(value))
         said = brief(self.text[place.start() : self.end - 1])

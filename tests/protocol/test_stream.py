@@ -5,7 +5,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from miro_protocol import stream, stream_header, stream_line
-from miro_protocol.actions import PinLevel, Power, Put, RadioState, Reset
+from miro_protocol.actions import PinLevel, Power, Put, RadioState, Reseed, Reset
 from miro_protocol.stream import Entry, StreamError
 from miro_protocol.transmission import DIRECTIONS, Transmission
 
@@ -101,6 +101,7 @@ def test_lines_look_as_the_protocol_page_shows_them():
     assert stream.format_line(Reset(5, 0, 2, 1)) == "5 *@0/2 reset 1"
     assert stream.format_line(Power(5, 0, 2, 0)) == "5 *@0/2 power 0"
     assert stream.format_line(RadioState(5, 1, "noise")) == "5 *@1 radio noise"
+    assert stream.format_line(Reseed(5, 1, 10042)) == "5 *@1 reseed 10042"
     assert stream.format_line(PinLevel(5, "P3.2", 0)) == "5 * P3.2 0"
     assert stream.format_line(Put(5, 0, 0, "eyes.distance_cm", 60)) == "5 * eyes.distance_cm = 60"
     assert stream.format_line(Put(5, 1, 2, "eyes.echo", "no #")) == '5 *@1/2 eyes.echo = "no \\u0023"'
@@ -168,6 +169,16 @@ REFUSED = [
     (V2 + "5 * P1.8 1", 2, 3, "is not an action", ""),
     (V2 + "5 * P1.0 1 1", 2, 13, "not an action", ""),
     (V2 + "5 *  # P1.0", 2, 4, "not an action", ""),
+    (V2 + "5 *@0 reseed 1", 2, 7, "'reseed' is not known in stream version 2", "`# mirotwin stream 3`"),
+    (
+        V3 + "5 *@0 reseed 9223372036854775808",
+        2,
+        14,
+        "seed 9223372036854775808",
+        "seeds 0..9223372036854775807",
+    ),
+    (V3 + "5 *@0/1 reseed 1", 2, 3, "is not an action", "`*@N reseed SEED`"),
+    (V3 + "5 *@0 reseed -1", 2, 3, "is not an action", ""),
     (V2 + "5 * eyes.distance_cm = 60", 2, 5, "is not known in stream version 2", "`# mirotwin stream 3`"),
     (V3 + "5 * eyes = 60", 2, 5, "'eyes = 60' is not PART.KEY = VALUE", "eyes.distance_cm = 60"),
     (V3 + "5 * eyes.echo = none", 2, 5, "'none' is no number, text or boolean", 'eyes.echo = "none"'),
@@ -213,6 +224,7 @@ def test_a_wrong_line_is_named_with_place_reason_and_remedy(text, line, column, 
 
 
 PIECES = ["5 ", "7 ", "> ", "<@1 ", "*@0/1 ", "* ", "55 ", "aa! ", "reset ", "radio ", "up ", "P1.0 ", "1 "]
+PIECES += ["*@0 ", "reseed "]
 PIECES += ["\n", "#: ", "# ", "seed = 1\n", "[set]\n", "scenario = ", "'fig6'", "@", "\r\n", "!", "\x85"]
 PIECES += ["9" * 30, "eyes.d ", "= ", "6.5", '"a"', "true"]
 texts = st.one_of(st.text(), st.lists(st.sampled_from(PIECES), max_size=30).map("".join))
@@ -252,6 +264,7 @@ def test_a_comment_that_was_read_can_be_written_whatever_editors_take_for_the_en
         (Power(0, 0, 5, 1), ""),
         (Power(0, 0, 0, 2), ""),
         (RadioState(0, 0, "off"), ""),
+        (Reseed(0, 0, 1 << 63), ""),
         (PinLevel(0, "P4.0", 1), ""),
         (Put(0, 0, 0, "eyes", 1), ""),
         (Put(0, 0, 5, "eyes.d", 1), ""),
@@ -283,11 +296,12 @@ def test_transmissions_out_of_order_are_not_written():
         ("*@0/1 reset 1", "`mirotwin replay`"),
         ("*@0/1 power 0", "`mirotwin replay`"),
         ("*@0 radio down", "`mirotwin replay`"),
+        ("*@0 reseed 1", "`mirotwin replay`"),
         ("* P1.0 0", "`mirotwin fw run --pins FILE`"),
     ],
 )
 def test_who_cannot_act_on_an_event_refuses_it_and_says_who_can(event, who):
-    found = stream.parse(f"{V2}1 > 55\n5 {event}\n", "a.stream")
+    found = stream.parse(f"{V3}1 > 55\n5 {event}\n", "a.stream")
     with pytest.raises(
         StreamError, match=r"a\.stream:3:1: an action, which this command does not support; "
     ) as caught:

@@ -7,7 +7,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 
-from miro_protocol.actions import Action, Put, RadioState, Reset
+from miro_protocol.actions import Action, Put, RadioState, Reseed, Reset
 from miro_sim.periods import RobotPeriod
 from mirotwin.report.foxglove.frames import robot_frame
 from mirotwin.report.foxglove.messages import INFO, WARNING, Log, time_of
@@ -64,6 +64,8 @@ def of_action(action: Action) -> Log:
     time = time_of(action.tick)
     if isinstance(action, RadioState):
         return Log(time, INFO, f"radio: {action.state}", f"net{action.network}")
+    if isinstance(action, Reseed):
+        return Log(time, INFO, f"reseed: {action.seed}", f"net{action.network}")
     if isinstance(action, Put):
         return Log(time, INFO, action.text, f"net{action.network}")
     if isinstance(action, Reset):

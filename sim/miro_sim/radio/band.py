@@ -43,6 +43,12 @@ class Transmitter:
         self.dropouts = None if params.dropouts is None else Chain(params.dropouts, seed, f"{name}/dropouts")
         self.last_edge = -1
 
+    def reseed(self, seed: int, slot: int) -> None:
+        """The chains of another seed from `slot` on."""
+        for chain in (self.bursts, self.dropouts):
+            if chain is not None:
+                chain.reseed(seed, slot)
+
 
 class Band:
     """The mixed level. Ticks are the receiver's; queries come in ascending order, below `limit`."""
@@ -74,6 +80,14 @@ class Band:
         """Adds a robot's TXD wire, before anything is received; `robot` is its number in the names of streams."""
         line.unread = False
         self.transmitters.append(Transmitter(line, self.params, self.seed, f"{self.name}/robot{robot}"))
+
+    def reseed(self, seed: int, tick: int) -> None:
+        """The noise of another seed from `tick` on."""
+        self.change_tick, self.alone_until = 0, -_NEVER  # found with the old seed's errors
+        self.errors.reseed(seed)
+        self.noise.reseed(seed)
+        for transmitter in self.transmitters:
+            transmitter.reseed(seed, (tick - self.latency) // _BIT)
 
     def limit(self) -> int:
         """The tick up to which the robots' wires, and so the level, are final."""

@@ -10,7 +10,7 @@ for both states at once:
 From good to bad with probability `enter`, from bad to good with `leave`: the Gilbert-Elliott chain. And the
 state in slot i is settled by the last slot up to i whose draw fell into one of the two ranges, so that it is
 a pure function of (seed, stream, i): one walks back until there is one, 1 / (enter + leave) steps on average.
-Before slot 0 the state is good.
+Before slot 0 the state is good. After `reseed` the state before the first slot of the new seed is the old seed's.
 """
 
 from __future__ import annotations
@@ -22,7 +22,10 @@ _ONE = 1 << 32
 
 
 class Chain:
-    """The chain of one stream. It has no state: slot and answer of the last call are a cache."""
+    """The chain of one stream. It has no state: slot and answer of the last call are a cache.
+
+    `first`: the first slot of its seed; `before`: the state in all slots before that.
+    """
 
     NOT_STATE = ("*",)
 
@@ -30,8 +33,18 @@ class Chain:
         self.stream = Stream(seed, name)
         self.enter, leave = params.chances()
         self.stay = _ONE - leave  # draws from here on end the bad state
+        self.first = 0
+        self.before = 0
         self.slot = -1
         self.answer = 0
+
+    def reseed(self, seed: int, first: int) -> None:
+        """The draws of another seed from slot `first` on."""
+        self.before = self.bad(first - 1) if first > 0 else 0  # the walk into the past would use the new seed
+        self.first = max(first, 0)
+        self.slot = self.first - 1
+        self.answer = self.before
+        self.stream.reseed(seed)
 
     def __repr__(self) -> str:
         return f"Chain({self.stream.name!r}, enter={self.enter}, leave={_ONE - self.stay})"
@@ -40,11 +53,13 @@ class Chain:
         """1 if the state in a slot (0 or greater) is bad."""
         if slot == self.slot:
             return self.answer
+        if slot < self.first:
+            return self.before
         known = self.slot
         answer = self.answer
         if slot < known:
-            known = -1
-            answer = 0
+            known = self.first - 1
+            answer = self.before
         for index in range(slot, known, -1):
             draw = self.stream.u32(index)
             if draw < self.enter:

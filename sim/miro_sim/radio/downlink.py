@@ -76,6 +76,13 @@ class Downlink:
         line.settled_tick = 0  # an open wire stays at mark
         return listener
 
+    def reseed(self, seed: int, tick: int) -> None:
+        """The noise of another seed from `tick` on."""
+        self.jitter.reseed(seed)
+        self.lost.reseed(seed)
+        for listener in self.listeners.values():
+            listener.reseed(seed, tick)
+
     def overhear(self, other: Downlink) -> None:
         """Puts another network on this one's frequency, before tick 0: the robots of this one hear it too."""
         heard = Sender(other.params, self.params.crystal_offset_ppm)

@@ -59,6 +59,14 @@ class Listener:
     def __repr__(self) -> str:
         return f"Listener({self.errors.name!r}, bit_errors={self.bit_errors}, slicer={self.slicer!r})"
 
+    def reseed(self, seed: int, tick: int) -> None:
+        """The noise of another seed from `tick` on."""
+        for stream in (self.errors, self.noise, self.idle, self.lost, self.collision):
+            stream.reseed(seed)
+        for chain in (self.bursts, self.dropouts):
+            if chain is not None:
+                chain.reseed(seed, tick // _BIT)
+
     def fill(self, tick: int, until: int, senders: list[Sender], rank: int) -> None:
         """The wire's edges from `tick` up to `until`, as `senders[rank:]` have it: the first one on the air wins.
 

@@ -2,7 +2,8 @@
 values of a board's parts.
 
 An action takes effect before anything else happens at its tick. The radio is settled a little ahead of the robots, so
-its band down changes `SETTLE_TICKS` earlier than the rest, for the same tick: RADIO_DOWN and RADIO_UP are two entries.
+its band down changes `SETTLE_TICKS` earlier than the rest, for the same tick: RADIO_DOWN and RADIO_UP are two entries,
+and so are RESEED_DOWN and RESEED_UP. Streams of random numbers have no state: a load reseeds them again.
 What waits is saved, but no part of the digest: a run does not depend on when an action was announced.
 """
 
@@ -13,7 +14,7 @@ from typing import TYPE_CHECKING, NamedTuple
 
 from miro_exact.clock import NEVER_TICK
 from miro_exact.state import Rows
-from miro_protocol.actions import PUT_BYTES, Action, Power, Put, RadioState, Reset, put_of
+from miro_protocol.actions import PUT_BYTES, Action, Power, Put, RadioState, Reseed, Reset, put_of
 from miro_sim.radio.params import LINK_STATES
 from miro_sim.world.events import PC, Event
 
@@ -23,15 +24,15 @@ if TYPE_CHECKING:
 
 SETTLE_TICKS = 120
 """How far beyond a robot's stop the line must be known: an instruction may overrun by four machine cycles."""
-RESET, POWER, RADIO_DOWN, RADIO_UP, PUT = range(5)
-_EVENTS = {RESET: "reset", POWER: "power", RADIO_UP: "radio", PUT: "put"}
+RESET, POWER, RADIO_DOWN, RADIO_UP, PUT, RESEED_DOWN, RESEED_UP = range(7)
+_EVENTS = {RESET: "reset", POWER: "power", RADIO_UP: "radio", PUT: "put", RESEED_UP: "reseed"}
 _MOST_WAITING = 1 << 16
 
 
 class WaitingAction(NamedTuple):
     """An action that waits for `tick`. `slot`: 0 for the radio's; `value`: a level, or the number of a link's state.
 
-    `text`: of a put, `PART.KEY = VALUE` in UTF-8.
+    `text`: of a put, `PART.KEY = VALUE` in UTF-8; the digits of a new seed.
     """
 
     tick: int
@@ -41,29 +42,35 @@ class WaitingAction(NamedTuple):
     text: bytes = b""
 
 
-class Actions:
-    """The actions of one line. `done`: those of the control period that is under way, a record."""
+_ROWS = Rows(
+    *(
+        _MOST_WAITING,
+        ("q", -SETTLE_TICKS, NEVER_TICK),
+        ("B", RESET, RESEED_UP),
+        ("B", 0, 255),
+        ("B", 0, 2),
+        ("s", PUT_BYTES),
+    ),
+    split=tuple,
+    make=lambda cells: WaitingAction(*cells),
+    ordered=True,
+)
 
-    STATE = {
-        "waiting": Rows(
-            *(
-                _MOST_WAITING,
-                ("q", -SETTLE_TICKS, NEVER_TICK),
-                ("B", RESET, PUT),
-                ("B", 0, 255),
-                ("B", 0, 2),
-                ("s", PUT_BYTES),
-            ),
-            split=tuple,
-            make=lambda cells: WaitingAction(*cells),
-            ordered=True,
-        )
-    }
-    NOT_STATE = ("network", "done")
+
+class Actions:
+    """The actions of one line. `done`: those of the control period that is under way, a record.
+
+    `reseeds`: those that were done; `drawn`: those whose seeds the streams have, which a load may leave behind.
+    """
+
+    STATE = {"waiting": _ROWS, "reseeds": _ROWS}
+    NOT_STATE = ("network", "done", "drawn")
 
     def __init__(self, network: int) -> None:
         self.network = network
         self.waiting: list[WaitingAction] = []
+        self.reseeds: list[WaitingAction] = []
+        self.drawn: list[WaitingAction] = []
         self.done: list[Action] = []
 
     @property
@@ -80,12 +87,17 @@ class Actions:
 
     def announce(self, action: Action) -> None:
         """Behind the actions of the same tick that were announced before."""
-        if len(self.waiting) + 2 > _MOST_WAITING:
-            raise ValueError(f"net{self.network}: {len(self.waiting)} actions wait; at most {_MOST_WAITING}")
+        waiting = len(self.waiting) + len(self.reseeds)  # each reseed that waits is kept when it is done
+        if waiting + 2 > _MOST_WAITING:
+            raise ValueError(f"net{self.network}: {waiting} actions wait; at most {_MOST_WAITING}")
         if isinstance(action, RadioState):
             value = LINK_STATES.index(action.state)
             self.waiting.append(WaitingAction(action.tick - SETTLE_TICKS, RADIO_DOWN, 0, value))
             self.waiting.append(WaitingAction(action.tick, RADIO_UP, 0, value))
+        elif isinstance(action, Reseed):
+            text = str(action.seed).encode()
+            self.waiting.append(WaitingAction(action.tick - SETTLE_TICKS, RESEED_DOWN, 0, 0, text))
+            self.waiting.append(WaitingAction(action.tick, RESEED_UP, 0, 0, text))
         elif isinstance(action, Put):
             self.waiting.append(WaitingAction(action.tick, PUT, action.slot, 0, action.text.encode()))
         elif isinstance(action, Reset):
@@ -101,7 +113,13 @@ class Actions:
             if action.what == RADIO_DOWN:
                 medium.set_radio(action.value, up=False)
                 continue
-            slot = PC if action.what == RADIO_UP else action.slot
+            if action.what in (RESEED_DOWN, RESEED_UP):
+                self._reseed(medium, action)
+                self.reseeds.append(action)
+                self.drawn = list(self.reseeds)
+            if action.what == RESEED_DOWN:
+                continue
+            slot = PC if action.what in (RADIO_UP, RESEED_UP) else action.slot
             self.done.append(self._do(medium, action))
             event = Event(
                 tick=action.tick,
@@ -117,6 +135,8 @@ class Actions:
         if action.what == RADIO_UP:
             medium.set_radio(action.value, up=True)
             return RadioState(action.tick, self.network, LINK_STATES[action.value])
+        if action.what == RESEED_UP:
+            return Reseed(action.tick, self.network, int(action.text))
         device = medium.device(action.slot)
         if action.what == PUT:
             put = self._put(action)
@@ -131,6 +151,20 @@ class Actions:
 
     def _put(self, action: WaitingAction) -> Put:
         return put_of(action.tick, self.network, action.slot, action.text.decode())
+
+    def _reseed(self, medium: Medium, action: WaitingAction) -> None:
+        up = action.what == RESEED_UP
+        medium.reseed(int(action.text), action.tick if up else action.tick + SETTLE_TICKS, up)
+
+    def draw_again(self, medium: Medium, seed: int) -> None:
+        """After a load: gives the streams the seeds that they had. `seed`: the world's own."""
+        if self.drawn == self.reseeds:
+            return
+        for up in (False, True):
+            medium.reseed(seed, 0, up)
+        for action in self.reseeds:
+            self._reseed(medium, action)
+        self.drawn = list(self.reseeds)
 
     def check(self, devices: Sequence[Device]) -> None:
         """Raises ValueError for a device that is not there, a level other than 0 and 1, and what no part takes."""

@@ -101,7 +101,7 @@ class Event(msgspec.Struct, frozen=True, kw_only=True, gc=False):
             return f" {self.address:#06x}"
         if self.what in ("reset", "power"):
             return f" {self.value}"
-        if self.what == "put":
+        if self.what in ("put", "reseed"):
             return f" {self.data.decode()}"
         if self.what == "radio":
             return f" {LINK_STATES[self.value]}"

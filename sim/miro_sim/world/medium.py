@@ -11,8 +11,9 @@ from collections.abc import Sequence
 from typing import Any
 
 from miro_exact.clock import CYCLE_TICKS
+from miro_exact.domain import MAX_SEED
 from miro_exact.state import TICK, Rows
-from miro_protocol.actions import Action, Put, RadioState, Reset, ScriptItem
+from miro_protocol.actions import Action, Put, RadioState, Reseed, Reset, ScriptItem
 from miro_protocol.decoder import Symbol
 from miro_protocol.transmission import DOWN, Transmission, check_bad_stop
 from miro_sim.periods import PartValues, RobotPeriod
@@ -140,6 +141,10 @@ class Medium:
         """Raises ValueError for an action that cannot be done here."""
         if isinstance(action, RadioState):
             raise ValueError(f"net{self.index}: is a wire, which has no radio")
+        if isinstance(action, Reseed):
+            if not 0 <= action.seed <= MAX_SEED:
+                raise ValueError(f"net{self.index}: seed {action.seed}; give 0 to {MAX_SEED}")
+            return
         device = self.device(action.slot)
         if isinstance(action, Put):
             device.check_put(action.path, action.value)
@@ -150,6 +155,10 @@ class Medium:
 
     def set_radio(self, state: int, up: bool) -> None:
         """Another state of the link, up or down; only a radio has one."""
+
+    def reseed(self, seed: int, tick: int, up: bool) -> None:
+        """The noise of another seed from `tick` on: of what is settled ahead of the devices, or (`up`) of the rest."""
+        raise NotImplementedError
 
     # For the summary
 
@@ -184,6 +193,9 @@ class Medium:
         """
         if self.actions.next_tick < tick - SETTLE_TICKS:
             raise ValueError(f"an action waits for tick {self.actions.next_tick}, at tick {tick}")
+        for reseed in self.actions.reseeds:
+            if reseed.tick > tick:
+                raise ValueError(f"the noise of tick {reseed.tick} is there at tick {tick}")
         self.actions.check(self.devices)
         free_tick = self.free_tick()
         if free_tick > tick + LONGEST_TRANSMISSION_TICKS:

@@ -179,6 +179,15 @@ class Network(Medium):
         for listener in self.downlink.listeners.values():
             listener.link_state = state
 
+    def reseed(self, seed: int, tick: int, up: bool) -> None:
+        if not up:
+            self.downlink.reseed(seed, tick)
+            return
+        self.uplink.band.reseed(seed, tick)
+        self.sight.reseed(seed)
+        for stream in (*self.draws, *(robot.noise for robot in self.robots)):
+            stream.reseed(seed)
+
     @property
     def bit_errors(self) -> int:
         """Bits that the radio turned over so far, down at every listener and up."""

@@ -9,7 +9,7 @@ cdef long long GRID_TICKS
 
 
 cdef class Robot(Device):
-    cdef readonly object spec
+    cdef readonly object spec, noise
     cdef readonly Pilot pilot
     cdef readonly DifferentialDrive drive
     cdef public list noted

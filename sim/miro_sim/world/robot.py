@@ -37,6 +37,7 @@ class Robot(Device):
     NOT_STATE = (
         "spec",
         "drive",  # the board saves it
+        "noise",
         "grid_tick", "noted",  # where it was in the piece that runs
     )  # fmt: skip
 
@@ -45,10 +46,10 @@ class Robot(Device):
     ) -> None:
         name = f"net{network}/robot{spec.slot}"
         self.spec = spec
-        wheels, noise = Stream(seed, f"{name}/wheels"), Stream(seed, f"{name}/disturbance")
+        wheels, self.noise = Stream(seed, f"{name}/wheels"), Stream(seed, f"{name}/disturbance")
         self.pilot: Pilot
         try:
-            self.pilot, self.drive = pilot_and_drive(spec, scenario, network, wheels, noise)
+            self.pilot, self.drive = pilot_and_drive(spec, scenario, network, wheels, self.noise)
         except PluginError as error:
             raise _named(error, name, 0) from error
         strap = spec.slot if spec.strap is None else spec.strap

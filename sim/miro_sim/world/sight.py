@@ -52,6 +52,9 @@ class Sight(Protocol):
     def counts(self) -> dict[str, int]:
         """For the summary, by name; empty for a camera that neither loses nor mistakes anything."""
 
+    def reseed(self, seed: int) -> None:
+        """The noise of another seed from now on; the calibration stays."""
+
 
 class GaussianSight:
     """White noise on the posture of each robot."""
@@ -81,6 +84,10 @@ class GaussianSight:
 
     def counts(self) -> dict[str, int]:
         return {}
+
+    def reseed(self, seed: int) -> None:
+        for stream in self.streams:
+            stream.reseed(seed)
 
 
 class SeeingSight:
@@ -116,6 +123,9 @@ class SeeingSight:
     def counts(self) -> dict[str, int]:
         names = ("lost", "dropped", "repeated", "wrong", "swapped")
         return {"frames": self.frame, **{name: getattr(self, name) for name in names}}
+
+    def reseed(self, seed: int) -> None:
+        self.chances.reseed(seed)
 
     def look(self, tick: int) -> list[Sighting | None]:
         """What the tracker finds in the frame exposed at `tick`."""
@@ -252,6 +262,10 @@ class PixelSight(SeeingSight):
         if self.watch is not None:
             self.watch(self.frame - 1, tick)
         return arrived
+
+    def reseed(self, seed: int) -> None:
+        SeeingSight.reseed(self, seed)
+        self.eye.sensor.stream.reseed(seed)
 
     def look(self, tick: int) -> list[Sighting | None]:
         return self.tracker.track(self.picture_at(self.frame, tick), tick)

@@ -254,6 +254,11 @@ class Wire(Medium):
         """The host's level from `tick` on."""
         self.board.cpu.rxd.append(tick, level)
 
+    def reseed(self, seed: int, tick: int, up: bool) -> None:
+        for device in self.devices if up else ():
+            for part in device.board.parts if isinstance(device.board, WiredBoard) else ():
+                part.place.noise.reseed(seed)
+
     def free_tick(self) -> int:
         return self.busy_tick
 

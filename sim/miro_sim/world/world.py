@@ -21,7 +21,7 @@ from miro_exact.clock import NEVER_TICK
 from miro_exact.domain import MAX_SEED
 from miro_exact.engine import check_arithmetic
 from miro_exact.state import TICK, Flat, Octets
-from miro_protocol.actions import Action, Power, RadioState, Reset, ScriptItem
+from miro_protocol.actions import Action, Power, RadioState, Reseed, Reset, ScriptItem
 from miro_protocol.transmission import DOWN, Transmission
 from miro_robot.faults import FirmwareFault
 from miro_robot.image import Image
@@ -245,7 +245,8 @@ class World:
         return device
 
     def do(self, action: Action) -> int:
-        """Announces what is done at a tick, before all else: `Reset`, `Power`, `RadioState`, `Put`; returns the tick.
+        """Announces what is done at a tick, before all else: `Reset`, `Power`, `RadioState`, `Put`, `Reseed`; returns
+        the tick.
 
         Raises ValueError for a tick before `earliest_action_tick`, a network, robot, part or key that is not there, a
         value that the part does not take, and for levels other than 0 and 1.
@@ -272,6 +273,13 @@ class World:
     def set_radio(self, state: LinkState, network: int = 0) -> int:
         """Lets a radio work ("up"), be off ("down") or give "noise", as soon as possible; returns the tick."""
         return self.do(RadioState(self.earliest_action_tick, network, state))
+
+    def reseed(self, seed: int, network: int = 0) -> int:
+        """Gives a line the noise of another seed as soon as possible; returns the tick.
+
+        What is drawn once a seed (wheels, calibration) stays.
+        """
+        return self.do(Reseed(self.earliest_action_tick, network, seed))
 
     def _slot(self, network: int, slot: int | None) -> int:
         return self._line(network).first_slot if slot is None else slot
@@ -434,6 +442,7 @@ class World:
             raise ValueError(f"the digest has {len(self.chain)} bytes after {self.index} periods")
         for line in self.lines:
             line.check_times(begun - self.period_ticks, self.tick)
+            line.actions.draw_again(line, self.seed)
 
     def identity(self) -> Identity:
         """What a saved world must belong to so that this one can load it."""

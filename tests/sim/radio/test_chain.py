@@ -6,6 +6,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
+from miro_exact.rng import Stream
 from miro_sim.radio.chain import Chain
 from miro_sim.radio.params import Bursts
 from miro_sim.scenario import profiles
@@ -36,6 +37,24 @@ def test_any_slot_in_any_order_is_as_the_naive_chain_has_it_step_by_step(params,
     assert [Chain(params, seed, "fade").bad(slot) for slot in slots[:3]] == [
         states[slot] for slot in slots[:3]
     ]
+
+
+@given(bursts() | dropouts, seeds, seeds, st.integers(0, 300), st.lists(st.integers(0, 400), max_size=20))
+def test_after_a_reseed_the_walk_into_the_past_ends_where_the_other_seed_begins(
+    params, seed, other, first, slots
+):
+    draws = Stream(seed, "fade"), Stream(other, "fade")
+    enter, leave = params.chances()
+    states, state = [], 0
+    for slot in range(401):
+        draw = draws[slot >= first].u32(slot)
+        state = 1 if draw < enter else 0 if draw >= (1 << 32) - leave else state
+        states.append(state)
+    chain = Chain(params, seed, "fade")
+    chain.bad(first // 2)
+    chain.reseed(other, first)
+    asked = [max(slot, first - 1, 0) for slot in slots]  # nobody asks for what is further behind
+    assert [chain.bad(slot) for slot in asked] == [states[slot] for slot in asked]
 
 
 def runs_of(states):

@@ -6,7 +6,7 @@ from hypothesis import strategies as st
 
 from miro_exact import engine
 from miro_exact.clock import ticks
-from miro_protocol.actions import Power, RadioState, Reset
+from miro_protocol.actions import Power, RadioState, Reseed, Reset
 from miro_protocol.frames import TeamFrame, encode
 from miro_protocol.table import DOWNLINK
 from miro_sim.world import conditions as wait
@@ -138,6 +138,7 @@ SCRIPT = (
     RadioState(3_000_000, 0, "down"),
     Power(3_000_000, 0, 2, OFF),
     Reset(4 * PERIOD, 1, 1, HELD),
+    Reseed(3_300_001, 0, 11),
     RadioState(3_400_000, 0, "up"),
     Power(3_900_123, 0, 2, ON),
     Reset(5 * PERIOD, 1, 1, RUNS),
@@ -204,6 +205,8 @@ def test_actions_are_events_that_say_what_was_done():
         (Reset(120, 0, 0, 2), "level 2; give 0 or 1"),
         (RadioState(120, 0, "loud"), "give up, down, noise"),
         (RadioState(1 << 62, 0, "up"), "the earliest is"),
+        (Reseed(120, 0, 1 << 63), "seed 9223372036854775808; give 0 to"),
+        (Reseed(120, 0, -1), "seed -1; give 0 to"),
     ],
 )
 def test_what_cannot_be_done_is_refused(action, what):
@@ -253,6 +256,7 @@ def digest_of_actions():
     """Of three periods with all kinds of actions and without a picture, which takes long uncompiled."""
     actions = [RadioState(400_000, 0, "noise"), RadioState(700_003, 0, "up")]
     actions += [Reset(900_001, 0, 0, HELD), Reset(900_400, 0, 0, RUNS)]
+    actions += [Reseed(350_001, 0, 99), Reseed(800_001, 0, 98)]
     actions += [Power(1_200_000, 0, 0, OFF), RadioState(1_300_000, 0, "down"), Power(1_500_123, 0, 0, ON)]
     settings = ["network.host=silent", "network.radio.profile=fade15", "camera={kind = 'gaussian'}"]
     world = world_of("fig6", *settings, script=actions)
