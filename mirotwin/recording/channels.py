@@ -24,7 +24,18 @@ from miro_exact.clock import nanoseconds
 from miro_exact.domain import MAX_SEED
 from miro_host.eye.track import Sighting
 from miro_host.posture import Posture
-from miro_protocol.actions import PUT_PATH, Action, Power, Put, PutValue, RadioState, Reseed, Reset
+from miro_protocol.actions import (
+    PUT_PATH,
+    Action,
+    Fault,
+    Power,
+    Put,
+    PutValue,
+    RadioState,
+    Reseed,
+    Reset,
+    fault_text,
+)
 from miro_protocol.stream import MAX_TICK
 from miro_protocol.transmission import DIRECTIONS, Transmission, check_bad_stop
 from miro_sim.periods import Axis, Control, RobotPeriod
@@ -33,6 +44,7 @@ PERIOD = "/period"
 WIRE = "wire"
 ACTIONS = "actions"
 PUTS = "puts"
+HARDWARE = "hardware"
 VALUES = "values"
 FAULT = "fault"
 IMAGE = "camera/image"
@@ -277,6 +289,14 @@ class PutMessage(msgspec.Struct, frozen=True, gc=False):
     value: PutValue
 
 
+class HardwareMessage(msgspec.Struct, frozen=True, gc=False):
+    """`hardware`: hardware of a robot broke, or was mended; `what` as in a stream file."""
+
+    tick: int
+    slot: int
+    what: str
+
+
 class ValuesMessage(msgspec.Struct, frozen=True, gc=False):
     """`values`: the values of the parts of a board at `tick`, by PART.KEY."""
 
@@ -312,6 +332,7 @@ OTHER_CHANNELS: dict[str, type[msgspec.Struct]] = {
     WIRE: WireMessage,
     ACTIONS: ActionMessage,
     PUTS: PutMessage,
+    HARDWARE: HardwareMessage,
     VALUES: ValuesMessage,
     FAULT: FaultMessage,
     IMAGE: ImageMessage,
@@ -325,17 +346,19 @@ def message_type(topic: Topic) -> type[msgspec.Struct] | None:
     return OTHER_CHANNELS.get(topic.channel)
 
 
-def action_message(action: Action) -> ActionMessage | PutMessage:
-    """The message about an action."""
+def action_message(action: Action) -> tuple[str, ActionMessage | PutMessage | HardwareMessage]:
+    """The message about an action, after its channel."""
     if isinstance(action, Put):
-        return PutMessage(action.tick, action.slot, action.path, action.value)
+        return PUTS, PutMessage(action.tick, action.slot, action.path, action.value)
+    if isinstance(action, Fault):
+        return HARDWARE, HardwareMessage(action.tick, action.slot, action.what)
     if isinstance(action, RadioState):
-        return ActionMessage(action.tick, -1, action.state)
+        return ACTIONS, ActionMessage(action.tick, -1, action.state)
     if isinstance(action, Reseed):
-        return ActionMessage(action.tick, -1, "reseed", action.seed)
+        return ACTIONS, ActionMessage(action.tick, -1, "reseed", action.seed)
     if isinstance(action, Reset):
-        return ActionMessage(action.tick, action.slot, "reset", action.level)
-    return ActionMessage(action.tick, action.slot, "power", action.on)
+        return ACTIONS, ActionMessage(action.tick, action.slot, "reset", action.level)
+    return ACTIONS, ActionMessage(action.tick, action.slot, "power", action.on)
 
 
 def action(network: int, message: ActionMessage) -> Action:
@@ -358,6 +381,13 @@ def put(network: int, message: PutMessage) -> Put:
     if not 0 <= message.tick <= MAX_TICK or message.slot < 0 or not PUT_PATH.fullmatch(message.path):
         raise ValueError(f"{action.text} at tick {message.tick}")
     return action
+
+
+def fault(network: int, message: HardwareMessage) -> Fault:
+    """The fault of a message. Raises ValueError for a message that cannot be."""
+    if not 0 <= message.tick <= MAX_TICK or message.slot < 0 or fault_text(message.what) != message.what:
+        raise ValueError(f"{message.what} of robot {message.slot} at tick {message.tick}")
+    return Fault(message.tick, network, message.slot, message.what)
 
 
 def transmission(network: int, message: WireMessage) -> Transmission:

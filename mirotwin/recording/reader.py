@@ -100,6 +100,8 @@ class _Collector:
             self.actions.append(channels.action(topic.network, message))
         elif isinstance(message, channels.PutMessage):
             self.actions.append(channels.put(topic.network, message))
+        elif isinstance(message, channels.HardwareMessage):
+            self.actions.append(channels.fault(topic.network, message))
         elif isinstance(message, channels.ValuesMessage):
             values = PartValues(topic.network, message.slot, message.tick, message.values)
             self.values.append(values)

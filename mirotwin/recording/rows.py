@@ -14,12 +14,9 @@ from msgspec.structs import astuple
 
 from miro_exact.clock import NS_PER_SECOND, TICKS_PER_SECOND
 from miro_host.eye.track import Sighting
-from miro_protocol.actions import Put
 from miro_sim.periods import Axis, Period, RobotPeriod
 from mirotwin.recording.channels import (
-    ACTIONS,
     PERIOD,
-    PUTS,
     VALUES,
     WIRE,
     CommandMessage,
@@ -160,8 +157,8 @@ class MessageWriter:
             message = WireMessage(sent.tick, sent.direction, sent.data.hex(), sent.bad_stop)
             self._add(_topic(WIRE, sent.network), sent.tick * ns // ticks, message)
         for action in period.actions:
-            channel = PUTS if isinstance(action, Put) else ACTIONS
-            self._add(_topic(channel, action.network), action.tick * ns // ticks, action_message(action))
+            channel, about = action_message(action)
+            self._add(_topic(channel, action.network), action.tick * ns // ticks, about)
         for parts in period.values:
             values = ValuesMessage(parts.tick, parts.slot, parts.values)
             self._add(_topic(VALUES, parts.network), parts.tick * ns // ticks, values)

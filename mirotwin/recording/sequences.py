@@ -6,7 +6,7 @@ from collections.abc import Iterator, Sequence
 from typing import Any, NamedTuple
 
 from miro_exact.clock import CONTROL_PERIOD_TICKS
-from miro_protocol.actions import Action, Put, RadioState, Reseed, Reset
+from miro_protocol.actions import Action, Fault, Put, RadioState, Reseed, Reset
 from miro_protocol.transmission import DOWN, Transmission
 from miro_robot.lm629.commands import BY_OPCODE
 from miro_sim.periods import Period
@@ -73,6 +73,8 @@ def _action(action: Action) -> str:
         return f"reseed {action.seed}"
     if isinstance(action, Put):
         return action.text
+    if isinstance(action, Fault):
+        return f"robot {action.slot} {action.what}"
     name, level = ("reset", action.level) if isinstance(action, Reset) else ("power", action.on)
     return f"robot {action.slot} {name} {level}"
 

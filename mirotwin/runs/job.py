@@ -16,7 +16,7 @@ from miro_exact.clock import CONTROL_PERIOD_TICKS, TICKS_PER_SECOND, seconds
 from miro_exact.inputs import RECORDING_BYTES, check_no_folder, read_input
 from miro_exact.installed import differences as plugin_differences
 from miro_protocol import stream
-from miro_protocol.actions import Power, Put, Reset, ScriptItem
+from miro_protocol.actions import Fault, Power, Put, Reset, ScriptItem
 from miro_protocol.stream_header import Header
 from miro_protocol.transmission import DOWN, Transmission
 from miro_robot.image import FLASH_BYTES, SPACE_BYTES, Image, Symbol, Symbols, parse_hex
@@ -106,7 +106,7 @@ def check_script(script: Sequence[ScriptItem], scenario: Scenario | None = None)
         elif isinstance(item, Put):
             reason = f"{item.path} is of a part or a pin of a board, and robots have none"
             raise BadInput("", f"tick {item.tick}", reason, "leave it out")
-        elif isinstance(item, Reset | Power) and scenario is not None:
+        elif isinstance(item, Reset | Power | Fault) and scenario is not None:
             slots = [robot.slot for robot in scenario.networks[item.network].robot]
             if item.slot not in slots:
                 there = f"there is {', '.join(map(str, slots))}"

@@ -77,6 +77,42 @@ class Put(msgspec.Struct, frozen=True):
         return f"{self.path} = {_written(self.value)}"
 
 
+class Fault(msgspec.Struct, frozen=True):
+    """`TICK *@N/SLOT encoder left lost`: hardware breaks, or is mended; `what` is a text of `fault_text`."""
+
+    tick: int
+    network: int
+    slot: int
+    what: str
+
+
+FAULTS = {
+    "flip": "ADDR.BIT",
+    "encoder": "left|right lost|a0|a1|b0|b1|ok",
+    "lm629": "left|right busy|dead|ok",
+    "power": "dip",
+    "rxd": "inverted|0|1|ok",
+}
+"""Word -> the words that follow it, places apart by blanks. ADDR.BIT is of internal RAM: 2Ah.3."""
+_RAM_BIT = re.compile(r"[0-9a-fA-F]{2}h\.[0-7]")
+
+
+def fault_text(text: str) -> str:
+    """The fault in its one spelling. Raises ValueError: reason; remedy."""
+    word, *values = text.split() or [""]
+    places = FAULTS.get(word, "").split()
+    if len(values) == len(places) > 0 and all(map(_fits, places, values)):
+        return (
+            f"{word} {values[0][:2].upper()}{values[0][2:]}" if word == "flip" else " ".join([word, *values])
+        )
+    ways = ", ".join(f"{word} {places}" for word, places in FAULTS.items())
+    raise ValueError(f"{text[:40]!r} is no hardware fault; write one of: {ways}, with ADDR.BIT as 2Ah.3")
+
+
+def _fits(place: str, value: str) -> bool:
+    return bool(_RAM_BIT.fullmatch(value)) if place == "ADDR.BIT" else value in place.split("|")
+
+
 def put_of(tick: int, network: int, slot: int, text: str) -> Put:
     """The put that this text says. Raises ValueError: reason; remedy."""
     path, equals, value = (part.strip() for part in text.partition("="))
@@ -113,7 +149,7 @@ def _written(value: PutValue) -> str:
     return repr(value)
 
 
-Action = Reset | Power | RadioState | Put | Reseed
+Action = Reset | Power | RadioState | Put | Reseed | Fault
 """What somebody does to a robot, a radio, a part or the noise in a world."""
 ScriptItem = Transmission | Action
 """What goes into a world from outside."""
@@ -130,6 +166,7 @@ WHO_CAN = {
     RadioState: "`mirotwin replay` switches radios off and on",
     Reseed: "`mirotwin replay` gives lines the noise of another seed",
     Put: "`mirotwin replay` puts values of the parts of a board",
+    Fault: "`mirotwin replay` breaks the hardware of robots",
     PinLevel: "`mirotwin fw run --pins FILE` puts levels on the pins of a bare processor",
 }
 """For a reader that cannot do an action: who can."""

@@ -8,25 +8,30 @@
     800000 *@1 reseed 10042
     800000 * P1.0 0
     800000 * eyes.distance_cm = 60
+    800000 *@1/2 encoder left lost
     40ms > 55 55 ff 2d d4          a time with its unit is read, too: ticks are what is written
 
 Version 1 has characters of network 0 with good stop bits, and nothing else; version 2 neither puts values of parts nor
-gives a line the noise of another seed.
+gives a line the noise of another seed, and has no hardware faults.
 """
 
 from __future__ import annotations
 
 import re
+from collections.abc import Callable
 from dataclasses import dataclass, field
 from reprlib import repr as brief
+from typing import TypeVar
 
 from miro_exact.bad_input import BadInput
 from miro_exact.clock import TICKS_PER_SECOND
 from miro_exact.domain import MAX_SEED
 from miro_exact.times import tick_of
 from miro_protocol.actions import (
+    FAULTS,
     PUT_PATH,
     Action,
+    Fault,
     PinLevel,
     Power,
     Put,
@@ -34,6 +39,7 @@ from miro_protocol.actions import (
     Reseed,
     Reset,
     ScriptItem,
+    fault_text,
     put_of,
 )
 from miro_protocol.table import ROBOT_COUNTS
@@ -63,10 +69,12 @@ _SEED = re.compile(r"[0-9]{1,19}")
 _PIN = re.compile(r"P[0-3]\.[0-7]")
 _ACTIONS = (
     "write `*@N/SLOT reset 0|1`, `*@N/SLOT power 0|1`, `*@N radio up|down|noise`,"
-    " `*@N reseed SEED`, `* P1.0 0|1` or `* PART.KEY = VALUE`"
+    " `*@N reseed SEED`, `* P1.0 0|1`, `* PART.KEY = VALUE`"
+    " or a hardware fault such as `*@N/SLOT encoder left lost`"
 )
 
 StreamItem = ScriptItem | PinLevel
+_T = TypeVar("_T")
 
 
 @dataclass(frozen=True, slots=True)
@@ -80,7 +88,7 @@ class Entry:
 
 def version_of(what: StreamItem) -> int:
     """The first version that has words for it."""
-    if isinstance(what, Put | Reseed):
+    if isinstance(what, Put | Reseed | Fault):
         return 3
     return 2 if not isinstance(what, Transmission) or what.network or what.bad_stop else 1
 
@@ -131,6 +139,9 @@ def _action(action: Action | PinLevel) -> str:
     if isinstance(action, Reseed):
         _check("seed", action.seed, MAX_SEED)
         return f"{HAND}@{action.network} reseed {action.seed}"
+    if isinstance(action, Fault):
+        _check("slot", action.slot, MAX_SLOT)
+        return f"{HAND}@{action.network}/{action.slot} {fault_text(action.what)}"
     if action.state not in RADIO_STATES:
         raise ValueError(f"state = {action.state!r}: must be {', '.join(RADIO_STATES)}")
     return f"{HAND}@{action.network} radio {action.state}"
@@ -233,6 +244,9 @@ class StreamLine:
     ) -> Action | PinLevel:
         if "=" in self.text[: self.end - 1]:
             return self._read_put(tick, network, slot, version)
+        words = [token[0] for token in self.tokens[2:]]
+        if words and words[0] in FAULTS and (words[0] != "power" or "dip" in words):
+            return self._read_fault(tick, network, slot, version)
         if len(self.tokens) != 4:
             raise self.error(self.end, "not an action", _ACTIONS)
         place, word, value = self.tokens[1], self.tokens[2][0], self.tokens[3][0]
@@ -251,14 +265,23 @@ class StreamLine:
         said = brief(self.text[place.start() : self.end - 1])
         raise self.error(place, f"{said} is not an action", _ACTIONS)
 
+    def _read_fault(self, tick: int, network: int | None, slot: int | None, version: int) -> Fault:
+        if network is None or slot is None:
+            raise self.error(self.tokens[1], "a fault of no robot", "write *@N/SLOT before it")
+        return self._of_text(version, lambda text: Fault(tick, network, slot, fault_text(text)))
+
     def _read_put(self, tick: int, network: int | None, slot: int | None, version: int) -> Put:
         if len(self.tokens) == 2:
             raise self.error(self.end, "not an action", _ACTIONS)
+        return self._of_text(version, lambda text: put_of(tick, network or 0, slot or 0, text))
+
+    def _of_text(self, version: int, read: Callable[[str], _T]) -> _T:
+        """An action of version 3, read from the text of the line after its place."""
         token = self.tokens[2]
         if version < 3:
             raise self._too_new(token, version, 3)
         try:
-            return put_of(tick, network or 0, slot or 0, self.text[token.start() : self.end - 1])
+            return read(self.text[token.start() : self.end - 1])
         except ValueError as error:
             reason, _, remedy = f"{error}".partition("; ")
             raise self.error(token, reason, remedy) from None

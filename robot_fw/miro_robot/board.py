@@ -246,6 +246,15 @@ class Board(ProcessorBoard):
         self.forced = 0
         self.held = level
 
+    def dip(self) -> None:
+        """The supply falls for no time: processor and LM629 begin again, RAM keeps what it has."""
+        if self.powered:
+            ram = [self.cpu.peek_iram(address) for address in range(256)]
+            self.set_power(0)
+            for address, byte in enumerate(ram):
+                self.cpu.poke_iram(address, byte)
+            self.set_power(1)
+
     def set_power(self, on: int) -> None:
         """Switches the robot's supply off or on, between two instructions.
 

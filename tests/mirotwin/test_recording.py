@@ -20,7 +20,7 @@ from miro_exact.clock import nanoseconds
 from miro_exact.domain import MAX_SEED
 from miro_host.eye.track import Sighting
 from miro_host.posture import Posture
-from miro_protocol.actions import Power, RadioState, Reseed, Reset
+from miro_protocol.actions import Fault, Power, RadioState, Reseed, Reset
 from miro_protocol.transmission import Transmission
 from miro_sim.periods import Axis, Control, Period, RobotPeriod
 from mirotwin.recording import channels, writer
@@ -63,6 +63,7 @@ def test_what_goes_in_comes_out_to_the_last_bit():
 def test_what_was_done_to_robots_and_radios_comes_out_again():
     actions = (Reset(5, 0, 2, 1), Power(6, 1, 0, 0), RadioState(7, 1, "noise"), RadioState(8, 1, "up"))
     actions += (Reseed(9, 1, MAX_SEED),)
+    actions += (Fault(10, 0, 2, "rxd 0"), Fault(11, 0, 0, "flip 2Ah.3"))
     period = msgspec.structs.replace(next(periods(1)), actions=actions)
     stream = io.BytesIO()
     with Recorder(stream, SOURCE) as recorder:

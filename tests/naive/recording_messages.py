@@ -16,7 +16,8 @@ def messages(period):
         message = ch.WireMessage(sent.tick, sent.direction, sent.data.hex(), sent.bad_stop)
         found.append((ch.topic_name(ch.WIRE, sent.network), sent.tick, message))
     for action in period.actions:
-        found.append((ch.topic_name(ch.ACTIONS, action.network), action.tick, ch.action_message(action)))
+        channel, about = ch.action_message(action)
+        found.append((ch.topic_name(channel, action.network), action.tick, about))
     found.append((ch.PERIOD, period.tick, ch.PeriodMessage(period.tick, period.index, period.digest)))
     return [(topic, tick, msgspec.json.encode(message)) for topic, tick, message in found]
 

@@ -5,7 +5,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from miro_protocol import stream, stream_header, stream_line
-from miro_protocol.actions import PinLevel, Power, Put, RadioState, Reseed, Reset
+from miro_protocol.actions import Fault, PinLevel, Power, Put, RadioState, Reseed, Reset
 from miro_protocol.stream import Entry, StreamError
 from miro_protocol.transmission import DIRECTIONS, Transmission
 
@@ -92,6 +92,15 @@ def test_a_put_or_the_header_of_a_board_makes_a_file_of_version_3():
     assert stream.format_stream([Put(5, 0, 0, "eyes.distance_cm", 60)]).startswith("# mirotwin stream 3\n")
     header = stream_header.of_text('board = "car.board.toml"\ncrystal_hz = 11059200')
     assert stream.format_stream([], header).startswith("# mirotwin stream 3\n")
+
+
+@pytest.mark.parametrize(
+    "what", ["flip FFh.7", "encoder right b1", "lm629 left busy", "power dip", "rxd 0", "rxd inverted"]
+)
+def test_a_hardware_fault_makes_a_file_of_version_3_and_is_read_back(what):
+    text = stream.format_stream([Fault(5, 1, 2, what)])
+    assert text == f"# mirotwin stream 3\n5 *@1/2 {what}\n"
+    assert [entry.what for entry in stream.parse(text).entries] == [Fault(5, 1, 2, what)]
 
 
 def test_lines_look_as_the_protocol_page_shows_them():
@@ -186,6 +195,12 @@ REFUSED = [
     (V3 + "5 * eyes.distance_cm = nan", 2, 5, "nan cannot be put", "a finite number"),
     (V3 + "5 * eyes.distance_cm = 9" + "9" * 30, 2, 5, "an integer of 103 bits", "63 at most"),
     (V3 + "5 * eyes.echo = 'a#b'", 2, 5, "is no number, text", ""),
+    (V2 + "5 *@0/1 encoder left lost", 2, 9, "is not known in stream version 2", "`# mirotwin stream 3`"),
+    (V3 + "5 *@0/1 encoder left", 2, 9, "'encoder left' is no hardware fault", "encoder left|right lost|a0"),
+    (V3 + "5 *@0/1 flip 2Ah.8", 2, 9, "'flip 2Ah.8' is no hardware fault", "ADDR.BIT as 2Ah.3"),
+    (V3 + "5 *@0/1 power dip now", 2, 9, "is no hardware fault", ""),
+    (V3 + "5 *@0/1 power dop", 2, 3, "is not an action", ""),
+    (V3 + "5 *@0 rxd 1", 2, 3, "a fault of no robot", "*@N/SLOT"),
     (V3 + "#: board = 5", 2, 4, "board: Expected", "the path of a board file"),
     (V3 + "#: crystal_hz = 0", 2, 4, "crystal_hz: Expected", "hertz"),
     (V2 + "9 > 55\n8 * P1.0 0", 3, 1, "tick 8 goes backwards", ""),
@@ -226,6 +241,7 @@ def test_a_wrong_line_is_named_with_place_reason_and_remedy(text, line, column, 
 PIECES = ["5 ", "7 ", "> ", "<@1 ", "*@0/1 ", "* ", "55 ", "aa! ", "reset ", "radio ", "up ", "P1.0 ", "1 "]
 PIECES += ["*@0 ", "reseed "]
 PIECES += ["\n", "#: ", "# ", "seed = 1\n", "[set]\n", "scenario = ", "'fig6'", "@", "\r\n", "!", "\x85"]
+PIECES += ["flip 2ah.3 ", "encoder ", "left ", "rxd 0 ", "power dip "]
 PIECES += ["9" * 30, "eyes.d ", "= ", "6.5", '"a"', "true"]
 texts = st.one_of(st.text(), st.lists(st.sampled_from(PIECES), max_size=30).map("".join))
 
@@ -266,6 +282,8 @@ def test_a_comment_that_was_read_can_be_written_whatever_editors_take_for_the_en
         (RadioState(0, 0, "off"), ""),
         (Reseed(0, 0, 1 << 63), ""),
         (PinLevel(0, "P4.0", 1), ""),
+        (Fault(0, 0, 5, "rxd 0"), ""),
+        (Fault(0, 0, 0, "rxd 2"), ""),
         (Put(0, 0, 0, "eyes", 1), ""),
         (Put(0, 0, 5, "eyes.d", 1), ""),
         (Put(0, 0, 0, "eyes.d", 1e400), ""),
@@ -275,7 +293,9 @@ def test_a_comment_that_was_read_can_be_written_whatever_editors_take_for_the_en
     ],
 )
 def test_what_could_not_be_read_back_is_not_written(wrong, comment):
-    with pytest.raises(ValueError, match=r"must be|at least one|cannot be put|half a character"):
+    with pytest.raises(
+        ValueError, match=r"must be|is no hardware fault|at least one|cannot be put|half a character"
+    ):
         stream.format_line(wrong, comment)
 
 

@@ -7,7 +7,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 
-from miro_protocol.actions import Action, Put, RadioState, Reseed, Reset
+from miro_protocol.actions import Action, Fault, Put, RadioState, Reseed, Reset
 from miro_sim.periods import RobotPeriod
 from mirotwin.report.foxglove.frames import robot_frame
 from mirotwin.report.foxglove.messages import INFO, WARNING, Log, time_of
@@ -68,6 +68,8 @@ def of_action(action: Action) -> Log:
         return Log(time, INFO, f"reseed: {action.seed}", f"net{action.network}")
     if isinstance(action, Put):
         return Log(time, INFO, action.text, f"net{action.network}")
+    if isinstance(action, Fault):
+        return Log(time, INFO, f"hardware: {action.what}", robot_frame(action.network, action.slot))
     if isinstance(action, Reset):
         return Log(time, INFO, f"reset: {action.level}", robot_frame(action.network, action.slot))
     return Log(time, INFO, f"power: {action.on}", robot_frame(action.network, action.slot))

@@ -132,7 +132,10 @@ class Downlink:
             return
         senders = [self.sender, *self.overheard]
         for listener in self.listeners.values():
-            listener.fill(self.settled_tick, until_tick, senders, 0)
+            if listener.rxd_state == 0:
+                listener.fill(self.settled_tick, until_tick, senders, 0)
+            else:
+                listener.fill_broken(self.settled_tick, until_tick, senders, 0)
             listener.line.settled_tick = until_tick
         self.settled_tick = until_tick
         self.sender.forget(until_tick)

@@ -8,13 +8,13 @@ from miro_exact.rng cimport Stream
 
 cdef long long _BIT, _CHARACTER
 cdef unsigned long long _ONE
-cdef int _DOWN, _NOISE
+cdef int _DOWN, _NOISE, _INVERTED, _AT_1
 
 
 @cython.final
 cdef class Listener:
     cdef readonly Line line
-    cdef public int link_state
+    cdef public int link_state, rxd_state
     cdef readonly long long bit_errors
     cdef readonly Slicer slicer
     cdef Stream errors, noise, idle, lost, collision
@@ -22,6 +22,8 @@ cdef class Listener:
     cdef unsigned long long threshold, burst_threshold, false_start, lost_threshold
     cdef bint squelch, noise_alone
 
+    @cython.locals(line=Line, heard=Line)
+    cpdef fill_broken(self, long long tick, long long until, list senders, Py_ssize_t rank)
     @cython.locals(sender=Sender, start='long long', stop='long long', level=int)
     cpdef fill(self, long long tick, long long until, list senders, Py_ssize_t rank)
     @cython.locals(sender=Sender)

@@ -12,7 +12,7 @@ from miro_exact.rng import Stream
 from miro_exact.state import TICK
 from miro_robot.mcs51.line import Line
 from miro_sim.radio.chain import Chain
-from miro_sim.radio.params import DOWN, NOISE, UP, Radio, threshold
+from miro_sim.radio.params import DOWN, NOISE, RXD_STATES, UP, Radio, threshold
 from miro_sim.radio.sender import Sender
 from miro_sim.radio.slicer import Slicer
 
@@ -20,16 +20,24 @@ _BIT = 2500
 _CHARACTER = 10
 _ONE = 1 << 32
 _DOWN, _NOISE = DOWN, NOISE
+_INVERTED, _AT_1 = RXD_STATES.index("inverted"), RXD_STATES.index("1")
 assert (HOST_BIT_TICKS, CHARACTER_BITS) == (_BIT, _CHARACTER)
 
 
 class Listener:
     """One robot's receiver. `bit_errors` counts the bits of its own network that it got wrong so far.
 
-    Characters that its module lost are not counted, nor what it heard of other networks.
+    Characters that its module lost are not counted, nor what it heard of other networks. `rxd_state`: a fault of the
+    wire, of `RXD_STATES`.
     """
 
-    STATE = {"link_state": ("i", 0, NOISE), "bit_errors": TICK, "slicer": Slicer}
+    STATE = {
+        "link_state": ("i", 0, NOISE),
+        "bit_errors": TICK,
+        "slicer": Slicer,
+        "rxd_state": ("i", 0, len(RXD_STATES) - 1),
+    }
+    NOT_HASHED = ("rxd_state",)  # what comes through the wire is hashed
     NOT_STATE = (
         "burst_threshold", "bursts", "collision", "dropouts", "errors", "false_start", "idle", "line", "lost",
         "lost_threshold", "noise", "noise_alone", "squelch", "threshold",
@@ -54,6 +62,7 @@ class Listener:
             self.slicer = Slicer(params.slicer, params.eb_n0_db)
         self.noise_alone = self.bursts is None and self.dropouts is None and self.slicer is None
         self.link_state = UP
+        self.rxd_state = 0
         self.bit_errors = 0
 
     def __repr__(self) -> str:
@@ -66,6 +75,18 @@ class Listener:
         for chain in (self.bursts, self.dropouts):
             if chain is not None:
                 chain.reseed(seed, tick // _BIT)
+
+    def fill_broken(self, tick: int, until: int, senders: list[Sender], rank: int) -> None:
+        """`fill` on a wire that is broken: inverted, or at one level."""
+        line, self.line = self.line, Line()
+        self.fill(tick, until, senders, rank)
+        heard, self.line = self.line, line
+        if self.rxd_state != _INVERTED:
+            line.append(tick, 1 if self.rxd_state == _AT_1 else 0)
+            return
+        line.append(tick, 1 - heard.level_at(tick))
+        for edge, level in heard.edges():
+            line.append(edge, 1 - level)
 
     def fill(self, tick: int, until: int, senders: list[Sender], rank: int) -> None:
         """The wire's edges from `tick` up to `until`, as `senders[rank:]` have it: the first one on the air wins.

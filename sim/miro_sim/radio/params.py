@@ -13,6 +13,8 @@ from miro_sim.ranges import Ranged, Within
 
 LinkState = Literal["up", "down", "noise"]
 UP, DOWN, NOISE = 0, 1, 2
+RXD_STATES = ("ok", "inverted", "0", "1")
+"""The wire from a robot's radio to its RXD, a fault: whole, inverted, at one level."""
 LINK_STATES: tuple[LinkState, ...] = ("up", "down", "noise")
 """Names, in the order of the numbers: whether the radio of a network works.
 

@@ -1,9 +1,10 @@
-"""What somebody does to the devices and the radio of a line at a tick: reset pins, supplies, radio on and off, and the
-values of a board's parts.
+"""What somebody does to the devices and the radio of a line at a tick: reset pins, supplies, radio on and off, the
+values of a board's parts, and hardware faults.
 
 An action takes effect before anything else happens at its tick. The radio is settled a little ahead of the robots, so
 its band down changes `SETTLE_TICKS` earlier than the rest, for the same tick: RADIO_DOWN and RADIO_UP are two entries,
-and so are RESEED_DOWN and RESEED_UP. Streams of random numbers have no state: a load reseeds them again.
+and so are RESEED_DOWN and RESEED_UP, and RXD and FAULT. Streams of random numbers have no state: a load reseeds them
+again.
 What waits is saved, but no part of the digest: a run does not depend on when an action was announced.
 """
 
@@ -14,8 +15,19 @@ from typing import TYPE_CHECKING, NamedTuple
 
 from miro_exact.clock import NEVER_TICK
 from miro_exact.state import Rows
-from miro_protocol.actions import PUT_BYTES, Action, Power, Put, RadioState, Reseed, Reset, put_of
-from miro_sim.radio.params import LINK_STATES
+from miro_protocol.actions import (
+    PUT_BYTES,
+    Action,
+    Fault,
+    Power,
+    Put,
+    RadioState,
+    Reseed,
+    Reset,
+    fault_text,
+    put_of,
+)
+from miro_sim.radio.params import LINK_STATES, RXD_STATES
 from miro_sim.world.events import PC, Event
 
 if TYPE_CHECKING:
@@ -24,15 +36,20 @@ if TYPE_CHECKING:
 
 SETTLE_TICKS = 120
 """How far beyond a robot's stop the line must be known: an instruction may overrun by four machine cycles."""
-RESET, POWER, RADIO_DOWN, RADIO_UP, PUT, RESEED_DOWN, RESEED_UP = range(7)
-_EVENTS = {RESET: "reset", POWER: "power", RADIO_UP: "radio", PUT: "put", RESEED_UP: "reseed"}
+RESET, POWER, RADIO_DOWN, RADIO_UP, PUT, RESEED_DOWN, RESEED_UP, RXD, FAULT = range(9)
+_EVENTS = {
+    RESET: "reset", POWER: "power", RADIO_UP: "radio", PUT: "put", RESEED_UP: "reseed", FAULT: "hardware",
+}  # fmt: skip
+_LIMITS = {RADIO_DOWN: len(LINK_STATES) - 1, RADIO_UP: len(LINK_STATES) - 1, RXD: len(RXD_STATES) - 1}
+DIP = b"power dip"
+"""A fault that begins all again, and is logged as what it is for who judges: the supply comes."""
 _MOST_WAITING = 1 << 16
 
 
 class WaitingAction(NamedTuple):
     """An action that waits for `tick`. `slot`: 0 for the radio's; `value`: a level, or the number of a link's state.
 
-    `text`: of a put, `PART.KEY = VALUE` in UTF-8; the digits of a new seed.
+    `text`: of a put, `PART.KEY = VALUE` in UTF-8; the digits of a new seed; the words of a fault.
     """
 
     tick: int
@@ -46,9 +63,9 @@ _ROWS = Rows(
     *(
         _MOST_WAITING,
         ("q", -SETTLE_TICKS, NEVER_TICK),
-        ("B", RESET, RESEED_UP),
+        ("B", RESET, FAULT),
         ("B", 0, 255),
-        ("B", 0, 2),
+        ("B", 0, len(RXD_STATES) - 1),
         ("s", PUT_BYTES),
     ),
     split=tuple,
@@ -100,6 +117,12 @@ class Actions:
             self.waiting.append(WaitingAction(action.tick, RESEED_UP, 0, 0, text))
         elif isinstance(action, Put):
             self.waiting.append(WaitingAction(action.tick, PUT, action.slot, 0, action.text.encode()))
+        elif isinstance(action, Fault):
+            words = fault_text(action.what)
+            if words.startswith("rxd "):
+                value = RXD_STATES.index(words[4:])
+                self.waiting.append(WaitingAction(action.tick - SETTLE_TICKS, RXD, action.slot, value))
+            self.waiting.append(WaitingAction(action.tick, FAULT, action.slot, 0, words.encode()))
         elif isinstance(action, Reset):
             self.waiting.append(WaitingAction(action.tick, RESET, action.slot, action.level))
         else:
@@ -113,6 +136,9 @@ class Actions:
             if action.what == RADIO_DOWN:
                 medium.set_radio(action.value, up=False)
                 continue
+            if action.what == RXD:
+                medium.set_rxd(action.slot, action.value)
+                continue
             if action.what in (RESEED_DOWN, RESEED_UP):
                 self._reseed(medium, action)
                 self.reseeds.append(action)
@@ -123,10 +149,10 @@ class Actions:
             self.done.append(self._do(medium, action))
             event = Event(
                 tick=action.tick,
-                what=_EVENTS[action.what],
+                what="power" if action.text == DIP else _EVENTS[action.what],
                 network=self.network,
                 slot=slot,
-                value=action.value,
+                value=1 if action.text == DIP else action.value,
                 data=action.text,
             )
             medium.log.note(event)
@@ -142,6 +168,10 @@ class Actions:
             put = self._put(action)
             device.put(put.path, put.value, action.tick)
             return put
+        if action.what == FAULT:
+            fault = Fault(action.tick, self.network, action.slot, action.text.decode())
+            device.break_hardware(fault.what)
+            return fault
         board = device.board
         if action.what == RESET:
             board.set_reset(action.value)
@@ -174,7 +204,11 @@ class Actions:
                 put = self._put(action)
                 devices[slots.index(action.slot)].check_put(put.path, put.value)
                 continue
-            if action.what in (RESET, POWER, PUT) and (action.slot not in slots or action.value > 1):
+            if action.what == FAULT and action.slot in slots:
+                devices[slots.index(action.slot)].check_fault(action.text.decode())
+                continue
+            of_device = action.what in (RESET, POWER, PUT, RXD, FAULT)
+            if (of_device and action.slot not in slots) or action.value > _LIMITS.get(action.what, 1):
                 raise ValueError(
                     f"an action waits for slot {action.slot} with level {action.value}, at tick {action.tick}"
                 )

@@ -6,7 +6,7 @@ from collections.abc import Callable
 from typing import Any
 
 from miro_exact.clock import CYCLE_TICKS
-from miro_protocol.actions import PutValue
+from miro_protocol.actions import PutValue, fault_text
 from miro_robot.event_log import TRUE
 from miro_robot.image import Image
 from miro_robot.processor_board import ProcessorBoard
@@ -101,6 +101,21 @@ class Device:
     def values(self) -> dict[str, float | int | bool | str]:
         """All values of its parts as they are now, by path."""
         return {}
+
+    # Hardware faults
+
+    def check_fault(self, what: str) -> None:
+        """Raises ValueError for what is no fault, and for one that this board cannot have."""
+        if not fault_text(what).startswith("flip "):
+            raise ValueError(
+                f'{what!r} is a fault of a robot; put a value of the part, as eyes.echo = "none"'
+            )
+
+    def break_hardware(self, what: str) -> None:
+        """Does the fault, between two instructions: a bit of RAM turns over."""
+        address, bit = what.split()[1].split("h.")
+        cpu = self.board.cpu
+        cpu.poke_iram(int(address, 16), cpu.peek_iram(int(address, 16)) ^ 1 << int(bit))
 
     # Pins
 

@@ -23,6 +23,7 @@ wheel_lost  a position error makes an LM629 switch its motor off          side
 reset       the level at a robot's reset pin is set                       value, slot
 power       a robot's supply is switched                                  value (1: on), slot
 put         a test puts a value of a board's part                         data (`PART.KEY = VALUE`), slot
+hardware    hardware breaks, or is mended                                 data (the fault), slot
 radio       a network's radio works, is off, or gives noise               value (of `radio.link_state`)
 touch       two robots have begun to touch, seen every millisecond        value (slot), other (network, slot)
 """
@@ -101,7 +102,7 @@ class Event(msgspec.Struct, frozen=True, kw_only=True, gc=False):
             return f" {self.address:#06x}"
         if self.what in ("reset", "power"):
             return f" {self.value}"
-        if self.what in ("put", "reseed"):
+        if self.what in ("put", "reseed", "hardware"):
             return f" {self.data.decode()}"
         if self.what == "radio":
             return f" {LINK_STATES[self.value]}"

@@ -13,7 +13,7 @@ from typing import Any
 from miro_exact.clock import CYCLE_TICKS
 from miro_exact.domain import MAX_SEED
 from miro_exact.state import TICK, Rows
-from miro_protocol.actions import Action, Put, RadioState, Reseed, Reset, ScriptItem
+from miro_protocol.actions import Action, Fault, Put, RadioState, Reseed, Reset, ScriptItem
 from miro_protocol.decoder import Symbol
 from miro_protocol.transmission import DOWN, Transmission, check_bad_stop
 from miro_sim.periods import PartValues, RobotPeriod
@@ -149,6 +149,9 @@ class Medium:
         if isinstance(action, Put):
             device.check_put(action.path, action.value)
             return
+        if isinstance(action, Fault):
+            device.check_fault(action.what)
+            return
         level = action.level if isinstance(action, Reset) else action.on
         if level not in (0, 1):
             raise ValueError(f"net{self.index}/robot{action.slot}: level {level!r}; give 0 or 1")
@@ -159,6 +162,9 @@ class Medium:
     def reseed(self, seed: int, tick: int, up: bool) -> None:
         """The noise of another seed from `tick` on: of what is settled ahead of the devices, or (`up`) of the rest."""
         raise NotImplementedError
+
+    def set_rxd(self, slot: int, state: int) -> None:
+        """A fault of the wire from the radio to a robot's RXD, of `RXD_STATES`; only a radio network has one."""
 
     # For the summary
 

@@ -188,6 +188,9 @@ class Network(Medium):
         for stream in (*self.draws, *(robot.noise for robot in self.robots)):
             stream.reseed(seed)
 
+    def set_rxd(self, slot: int, state: int) -> None:
+        self.downlink.listeners[slot].rxd_state = state
+
     @property
     def bit_errors(self) -> int:
         """Bits that the radio turned over so far, down at every listener and up."""

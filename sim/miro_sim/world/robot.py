@@ -10,15 +10,17 @@ from typing import Any
 
 from msgspec.structs import astuple
 
-from miro_exact.clock import NEVER_TICK, seconds
+from miro_exact.clock import CYCLE_TICKS, NEVER_TICK, seconds
 from miro_exact.plugins import PluginError
 from miro_exact.rng import Stream
 from miro_host.pilot import Pilot, WheelCommand
 from miro_host.posture import Posture
 from miro_host.telemetry_receiver import LastTelemetry
+from miro_protocol.actions import fault_text
 from miro_robot.board import Board
 from miro_robot.image import Image
 from miro_robot.lm629.chip import Lm629
+from miro_robot.lm629.host_port import DEAD, STUCK, WHOLE
 from miro_robot.lm629.options import Lm629Options
 from miro_robot.plant import Plant
 from miro_robot.processor_board import ProcessorBoard
@@ -28,6 +30,10 @@ from miro_sim.pitch.contact import GRID_TICKS
 from miro_sim.scenario import keys as sc
 from miro_sim.scenario.build import pilot_and_drive
 from miro_sim.world.device import Device
+
+ENCODERS = {"lost": (1, 1), "a0": (0, -1), "a1": (1, -1), "b0": (-1, 0), "b1": (-1, 1), "ok": (-1, -1)}
+"""Levels at which A and B are held, -1: not at all. Lost: both wires are open, with pull-ups at the LM629."""
+LM629S = {"ok": WHOLE, "busy": STUCK, "dead": DEAD}
 
 
 class Robot(Device):
@@ -76,6 +82,26 @@ class Robot(Device):
     def sample_tick(self) -> int:
         """Of the left LM629."""
         return self.board.left.sample_tick
+
+    def check_fault(self, what: str) -> None:
+        fault_text(what)
+
+    def break_hardware(self, what: str) -> None:
+        board = self.board
+        # Where the chips are depends on where the run was cut; up to the processor's own time it does not.
+        board.sync(board.cpu.cycles * CYCLE_TICKS)
+        word, *values = what.split()
+        if word == "encoder":
+            encoder = self.drive.left_encoder if values[0] == "left" else self.drive.right_encoder
+            level_a, level_b = ENCODERS[values[1]]
+            encoder.hold(level_a, level_b)
+        elif word == "lm629":
+            (board.left if values[0] == "left" else board.right).port.broken = LM629S[values[1]]
+        elif word == "power":
+            board.dip()
+        elif word == "flip":
+            Device.break_hardware(self, what)
+        # The network has broken the wire to RXD.
 
     def steer(self, measured: Posture | None, telemetry: LastTelemetry | None, tick: int) -> WheelCommand:
         """Wheel commands from what the PC measured and the robot's last telemetry. Raises PluginError."""

@@ -8,7 +8,7 @@ from hypothesis import strategies as st
 from msgspec.structs import replace
 
 from miro_exact.clock import CONTROL_PERIOD_TICKS
-from miro_protocol.actions import Power, RadioState, Reset
+from miro_protocol.actions import Fault, Power, RadioState, Reset
 from miro_protocol.transmission import Transmission
 from mirotwin.recording.compare import CompareRule, Difference, differences
 from mirotwin.recording.difference import first_per_channel
@@ -137,7 +137,7 @@ def test_only_differences_in_the_window_are_told():
 
 
 def test_the_hosts_values_and_actions_are_compared_on_request():
-    actions = (Reset(5, 0, 2, 0), Power(6, 0, 2, 1), RadioState(7, 0, "noise"))
+    actions = (Reset(5, 0, 2, 0), Power(6, 0, 2, 1), RadioState(7, 0, "noise"), Fault(8, 0, 2, "rxd 0"))
     robots = (replace(RUN[2].robots[0], control=None), RUN[2].robots[1])
     other = [*RUN[:2], replace(RUN[2], robots=robots, actions=actions), *RUN[3:]]
     assert differences(RUN, other) == []
@@ -145,6 +145,7 @@ def test_the_hosts_values_and_actions_are_compared_on_request():
     named = {one.channel for one in found}
     assert {"control v_m_s", "control inner.u1", "actions"} <= named
     told = ["robot 2 reset 0 at tick 5", "robot 2 power 1 at tick 6", "radio noise at tick 7"]
+    told += ["robot 2 rxd 0 at tick 8"]
     assert [one.replayed for one in found if one.channel == "actions"] == told
     assert found[0].channel == "actions"
 

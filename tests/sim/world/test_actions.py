@@ -10,7 +10,7 @@ from miro_protocol.actions import Power, RadioState, Reseed, Reset
 from miro_protocol.frames import TeamFrame, encode
 from miro_protocol.table import DOWNLINK
 from miro_sim.world import conditions as wait
-from miro_sim.world.actions import POWER, RESET, WaitingAction
+from miro_sim.world.actions import POWER, RADIO_UP, RESET, RXD, WaitingAction
 from miro_sim.world.waits import WaitExpired
 from tests.children import uncompiled
 from tests.sim.world.rig import PERIOD, fig6, two_networks, world_of
@@ -244,7 +244,15 @@ def test_a_time_that_is_no_whole_number_of_ticks_is_refused(move):
     assert world.save() == before
 
 
-@pytest.mark.parametrize("waiting", [WaitingAction(50_000, RESET, 3, 1), WaitingAction(50_000, POWER, 0, 2)])
+@pytest.mark.parametrize(
+    "waiting",
+    [
+        WaitingAction(50_000, RESET, 3, 1),
+        WaitingAction(50_000, POWER, 0, 2),
+        WaitingAction(50_000, RADIO_UP, 0, 3),
+        WaitingAction(50_000, RXD, 3, 1),
+    ],
+)
 def test_a_saved_action_that_cannot_be_done_is_refused(waiting):
     world, other = silent(), silent()
     world.networks[0].actions.waiting = [waiting]
