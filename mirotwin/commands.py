@@ -29,6 +29,7 @@ FIRMWARE = {
     "trace": Lazy("firmware.fw_trace", "Writes each instruction with the registers it changed."),
     "profile": Lazy("firmware.fw_profile", "Shows where the processor spends its time."),
     "coverage": Lazy("firmware.fw_profile", "Shows which lines of the firmware ran."),
+    "sanitize": Lazy("firmware.fw_sanitize", "Finds variables torn by interrupts, and such."),
     "vcd": Lazy("firmware.fw_trace", "Writes the wires as a VCD file."),
     "header": Lazy("firmware.fw_image", "Writes protocol.h: the numbers of the wire for C."),
 }

@@ -34,7 +34,7 @@ _NAME = re.compile(r"(?:(\w+)(?:\.c)?:)?(\w+)((?:\.\w+|\[[0-9]{1,6}\])*)")
 
 class Variable(msgspec.Struct, frozen=True):
     """`scope`: the file or function that it belongs to, "" for a global; `space` as of a `Symbol`; `module`: the file
-    whose structs its type means.
+    whose structs its type means; `local`: the scope is a function.
     """
 
     name: str
@@ -43,6 +43,7 @@ class Variable(msgspec.Struct, frozen=True):
     space: str
     type: CType
     module: str
+    local: bool = False
 
 
 class Variables(msgspec.Struct, frozen=True, eq=False):
@@ -79,7 +80,8 @@ def parse_variables(text: str) -> Variables:
             if known is not None and address < MOST_BYTES:  # beyond any memory is damage
                 kind, space, where = known
                 scope = _scope(record[1])
-                variable = Variable(record[2], scope, address, space, kind, where)
+                local = record[1][0] == "L"
+                variable = Variable(record[2], scope, address, space, kind, where, local)
                 found.setdefault(record[2], {})[scope] = variable
     bits = {
         (name, _scope(where)): Variable(name, _scope(where), -1, space, kind, module)

@@ -33,7 +33,19 @@ def _read_by(row: int, mnemonic: str, operands: str) -> tuple[str, ...]:
     return (*read, *_UNNAMED.get(row, ()), *(["Ri"] if "@Ri" in words else []))
 
 
-_READS = {row[0]: _read_by(row[0], row[3], row[4]) for row in TABLE}
+READS_BY_ROW = {row[0]: _read_by(row[0], row[3], row[4]) for row in TABLE}
+
+
+def written_form(row: int) -> str:
+    """The operand by which a row writes memory, as `READS_BY_ROW` has those that it reads; "" for none."""
+    forms = {
+        "dst": (_MOV_DIRECT,),
+        "dir": _DIRECT,
+        "@Ri": _INDIRECT,
+        "x@DPTR": (_MOVX_DPTR,),
+        "x@Ri": (_MOVX_PAGE,),
+    }
+    return next((form for form, rows in forms.items() if row in rows), "")
 
 
 class Bytes:
@@ -127,7 +139,7 @@ class Bytes:
 
     def _may_read(self, code: bytes, address: int, on_stack: bool) -> bool:
         first = code[(address + 1) & 0xFFFF]
-        for word in _READS[ROW[code[address]]]:
+        for word in READS_BY_ROW[ROW[code[address]]]:
             if word in ("dir", "src", "bit", "/bit"):
                 direct = byte_of_bit(first) if "bit" in word else first
                 may = self._holds(*_at(direct))
@@ -176,7 +188,7 @@ def _read_places(cpu: Cpu) -> Iterator[tuple[str, int, int]]:
     """(memory, address, bits) of what the next instruction reads."""
     opcode, first, _ = _code(cpu)
     register = cpu.bank + (opcode & 1)
-    for word in _READS[ROW[opcode]]:
+    for word in READS_BY_ROW[ROW[opcode]]:
         if word in ("dir", "src"):
             yield (*_at(first), 0xFF)
         elif word in ("bit", "/bit"):

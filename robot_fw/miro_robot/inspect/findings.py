@@ -1,0 +1,113 @@
+"""What the sanitizer saw, as sentences about C: where, which variable, and what comes between."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterable, Iterator
+from pathlib import PureWindowsPath as AnyPath
+
+import msgspec
+
+from miro_robot.image import Image
+from miro_robot.inspect.sanitizer import LOST, SHARED, TORN_READ, TORN_WRITE, Sanitizer
+from miro_robot.inspect.sanitizer_layout import XRAM, Layout
+from miro_robot.inspect.symbol_names import SymbolNames
+from miro_robot.mcs51.opcodes import INTERRUPTS
+
+KINDS = {
+    "race": "a variable that an interrupt may change between two halves, or whose change it may undo",
+    "overlay": "parameters, local and overlaid variables in use at two levels at once",
+}
+"""Kinds of findings, and what they are."""
+_SAYS = {
+    TORN_READ: "reads {name} in pieces in {function}",
+    TORN_WRITE: "writes {name} in pieces in {function}",
+    LOST: "loads {name}, changes and stores it in {function}",
+    SHARED: "stores {name} for {function}",
+}
+
+
+class Finding(msgspec.Struct, frozen=True, order=True):
+    """`did`: it happened at `tick`, else it may, for the first time there. `place`: `robot.c:77`, an address; `other`:
+    the other side, "" without one; `variable`: "" without one. `pc`, `other_pc`: their instructions, -1 for none;
+    `source`: the interrupt of the other side, -1 without one.
+    """
+
+    kind: str
+    place: str
+    variable: str
+    did: bool
+    tick: int
+    says: str
+    function: str
+    other: str = ""
+    pc: int = -1
+    other_pc: int = -1
+    source: int = -1
+
+    @property
+    def cause(self) -> tuple[str, ...]:
+        """What findings of one cause share: of shared bytes, who needs them, and which routine comes."""
+        if self.kind == "overlay":
+            return (self.kind, self.function, f"{self.source}")
+        return (self.kind, self.place, self.variable)
+
+    @property
+    def key(self) -> str:
+        """What an allow line begins with."""
+        return " ".join(filter(None, (self.kind, self.place, self.variable)))
+
+    def __str__(self) -> str:
+        word = "did" if self.did else "may"
+        return f"{word} {self.kind}  {self.place} {self.says}" + (f"; {self.other}" if self.other else "")
+
+
+class Reader:
+    """Makes findings of what sanitizers of one image saw."""
+
+    def __init__(self, image: Image, layout: Layout) -> None:
+        self.names = SymbolNames(image)
+        self.layout = layout
+
+    def findings(self, seen: Sanitizer) -> list[Finding]:
+        """One for each cause: what happened goes before what may."""
+        best: dict[tuple[str, ...], Finding] = {}
+        for finding in sorted(self._all(seen), key=lambda one: (not one.did, one.tick, one)):
+            best.setdefault(finding.cause, finding)
+        return sorted(best.values(), key=lambda one: (not one.did, one))
+
+    def _all(self, seen: Sanitizer) -> Iterator[Finding]:
+        for (kind, first, second), (tick, between, key) in seen.events.items():
+            yield self._race((kind, first, second), key, between & 0xFFFF, tick, between >> 16, did=True)
+        for pair, (key, sources_open, tick) in seen.pairs.items():
+            if pair[0] == LOST and key in self.layout.elements:
+                continue  # a buffer is handed over by a flag, which nobody sees
+            touches: Iterable[Callable[[int, int], int]]
+            touches = (seen.writer, seen.reader) if pair[0] == TORN_WRITE else (seen.writer,)
+            for source in range(len(INTERRUPTS)):
+                between = next((at for touch in touches if (at := touch(source, key)) >= 0), -1)
+                if sources_open >> source & 1 and between >= 0:
+                    yield self._race(pair, key, between, tick, source)
+
+    def _race(
+        self, pair: tuple[int, int, int], key: int, between: int, tick: int, source: int, did: bool = False
+    ) -> Finding:
+        kind, first, second = pair
+        function = self.function(second)
+        name = self._variable(key, function)
+        return Finding(
+            "overlay" if kind == SHARED else "race", self.place(first), name, did, tick,
+            _SAYS[kind].format(name=name, function=function), function,
+            f"{self.place(between)} in {self.function(between)} ({INTERRUPTS[source]} interrupt) comes between",
+            first, between, source,
+        )  # fmt: skip
+
+    def _variable(self, key: int, function: str) -> str:
+        known = self.layout.local_names.get((key, function)) or self.layout.names.get(key)
+        return known or (f"byte {key:02X}h" if key < XRAM else f"external byte {key - XRAM:04X}h")
+
+    def function(self, address: int) -> str:
+        return self.names.function(address)[1].removeprefix("_")
+
+    def place(self, address: int) -> str:
+        line = self.layout.debug.line_at(address)
+        return f"{address:#06x}" if line is None else f"{AnyPath(line.file).name}:{line.line}"

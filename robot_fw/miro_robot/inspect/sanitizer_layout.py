@@ -1,0 +1,108 @@
+"""What the sanitizer knows of an image before it runs: C lines, the bytes of variables, and what instructions touch."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+
+import msgspec
+
+from miro_robot.image import Image
+from miro_robot.image.c_types import CType, Fields
+from miro_robot.image.debug_info import DebugInfo
+from miro_robot.image.symbol_files import map_overlays, read_text
+from miro_robot.image.variables import variables_of
+from miro_robot.inspect.writes import READS_BY_ROW, written_form
+from miro_robot.mcs51.opcodes import ROW
+
+SCALAR, LOCAL = 1, 2
+"""A byte of a variable that the whole program has; of parameters, local variables, and what functions share."""
+FORMS = {"": 0, "dir": 1, "src": 1, "dst": 2, "@Ri": 3, "x@DPTR": 4, "x@Ri": 5}
+XRAM = _IRAM_BYTES = 256
+"""Places from here on are external RAM."""
+_INDIVISIBLE = {0x05, 0x06, 0x15, 0x16, 0x42, 0x43, 0x52, 0x53, 0x62, 0x63, 0xC5, 0xC6, 0xD5, 0xD6}  # rows
+_IMMEDIATE = {0x75, 0x76}
+_PARAMETER = "_PARM_"
+_MOST_PARAMETER_BYTES = 4
+
+READS = bytes(next((FORMS[word] for word in READS_BY_ROW[ROW[op]] if word in FORMS), 0) for op in range(256))
+WRITES = bytes(FORMS[written_form(ROW[op])] for op in range(256))
+CONSTANT = bytes(ROW[op] in _INDIVISIBLE | _IMMEDIATE for op in range(256))
+"""By opcode: what it reads and writes of memory, and whether what it writes follows from itself alone."""
+
+
+class Layout(msgspec.Struct, frozen=True, eq=False):
+    """`lines`: instruction -> a number of its C line; `places`: place -> (kind, key), of which a scalar's bytes share
+    one, its first place; `names`: key -> the variable's name; `local_names`: (key, function) -> the name there;
+    `elements`: keys of numbers in arrays.
+    """
+
+    lines: dict[int, int]
+    places: dict[int, tuple[int, int]]
+    names: dict[int, str]
+    local_names: dict[tuple[int, str], str]
+    elements: set[int]
+    debug: DebugInfo
+
+
+def layout_of(image: Image) -> Layout:
+    """Raises ImageError for debug files of another image."""
+    debug = DebugInfo.of(image)
+    numbers: dict[object, int] = {}
+    addresses = (address for first, end in image.used for address in range(first, end))
+    places_of_lines = ((address, debug.line_at(address)) for address in addresses)
+    lines = {
+        at: numbers.setdefault(line, len(numbers) + 1) for at, line in places_of_lines if line is not None
+    }
+    variables = variables_of(image)
+    places, local_names = _shared(image)
+    names, elements = {}, set()
+    kept = [one for each in variables.by_name.values() for one in each if one.space in ("iram", "xram")]
+    for variable in sorted(
+        kept, key=lambda one: not one.local
+    ):  # where both claim a byte, the whole program's wins
+        base = variable.address + (XRAM if variable.space == "xram" else 0)
+        if variable.local:
+            for place in range(base, base + variable.type.size):
+                places[place] = LOCAL, place
+                local_names[place, variable.scope] = variable.name
+            continue
+        for offset, size, name in _scalars(variable.type, variables.fields(variable), variable.name):
+            for place in range(base + offset, base + offset + size):
+                places[place] = SCALAR, base + offset
+            names[base + offset] = name
+            if variable.type.kind == "array":
+                elements.add(base + offset)
+    return Layout(lines, places, names, local_names, elements, debug)
+
+
+def _shared(image: Image) -> tuple[dict[int, tuple[int, int]], dict[tuple[int, str], str]]:
+    """What the map alone says: the area of overlays, and parameters of library functions."""
+    symbols = image.symbols.names
+    in_ram = sorted({one.address for one in symbols.values() if one.space == "iram"})
+    names: dict[tuple[int, str], str] = {}
+    places: dict[int, tuple[int, int]] = {}
+    for first, end in map_overlays(read_text(image.path.with_suffix(".map"))):
+        places.update((place, (LOCAL, place)) for place in range(first, min(end, _IRAM_BYTES)))
+    for name, one in symbols.items():
+        if _PARAMETER in name and one.space == "iram":
+            end = min([at for at in in_ram if at > one.address], default=_IRAM_BYTES)
+            size = min(end - one.address, _MOST_PARAMETER_BYTES)
+            function = name.removeprefix("_").partition(_PARAMETER)[0]
+            for place in range(one.address, one.address + size):
+                places[place] = LOCAL, place
+                names[place, function] = name.removeprefix("_")
+    return places, names
+
+
+def _scalars(kind: CType, fields: Fields, name: str) -> Iterator[tuple[int, int, str]]:
+    """(offset, bytes, name) of the numbers that a variable is made of; elements of an array have the array's name."""
+    if kind.kind == "array" and kind.element is not None:
+        inner = [*_scalars(kind.element, fields, name)]
+        for index in range(kind.count):
+            yield from ((index * kind.element.size + offset, size, text) for offset, size, text in inner)
+    elif kind.kind == "struct":
+        for member in fields.get(kind.tag, ()):
+            for offset, size, text in _scalars(member.type, fields, f"{name}.{member.name}"):
+                yield member.offset + offset, size, text
+    else:
+        yield 0, max(1, kind.size), name

@@ -1,0 +1,68 @@
+"""The sanitizer finds each planted mistake, and nothing in the correct idioms beside it."""
+
+import pytest
+
+from miro_robot.image import load_hex
+from miro_robot.inspect.findings import Reader
+from miro_robot.inspect.sanitizer import Sanitizer
+from miro_robot.inspect.sanitizer_layout import layout_of
+from miro_robot.inspect.watcher import attach
+from miro_robot.mcs51.cpu import Cpu
+from tests.robot.inspect.programs import build
+from tests.robot.sanitizer.planted import OVERLAID, OVERLAYS, RACES, planted
+from tests.states import snapshot
+
+
+def watched(path, cycles):
+    """Findings of an image that ran for so long, and the CPU."""
+    image = load_hex(path)
+    cpu, layout = Cpu(), layout_of(image)
+    cpu.load(image.code, image.used)
+    sanitizer = Sanitizer(layout)
+    attach(cpu, sanitizer)
+    cpu.run(cycles)
+    return Reader(image, layout).findings(sanitizer), cpu
+
+
+@pytest.fixture(scope="module")
+def races(tmp_path_factory):
+    return build(tmp_path_factory.mktemp("races"), RACES)
+
+
+def test_torn_and_lost_variables_are_found_and_correct_idioms_are_not(races):
+    found, _ = watched(races, 40_000)
+    assert {one.key for one in found} == planted(RACES)
+
+
+def test_what_may_happen_is_found_before_it_happens(races):
+    """A few turns of the main loop suffice, in which no interrupt came between."""
+    found, _ = watched(races, 2_500)
+    assert {one.key for one in found} == planted(RACES)
+    assert not all(one.did for one in found)
+    stamp = next(one for one in found if one.variable == "stamp")
+    assert not stamp.did
+    assert "reads stamp in pieces in main" in stamp.says
+    assert stamp.other.endswith("in tick (timer 0 interrupt) comes between")
+
+
+def test_what_happened_has_its_tick(races):
+    found, _ = watched(races, 400_000)
+    happened = next(one for one in found if one.did)
+    again, cpu = watched(races, happened.tick // 12)
+    assert cpu.cycles == happened.tick // 12
+    assert not next(one for one in again if one.key == happened.key).did
+
+
+def test_bytes_that_functions_share_are_found_where_an_interrupt_uses_them(tmp_path):
+    found, _ = watched(build(tmp_path, OVERLAYS), 60_000)
+    assert {one.kind for one in found} == {"overlay"}
+    assert {one.function for one in found} == OVERLAID
+
+
+def test_a_watched_run_ends_in_the_state_of_one_that_is_not(races):
+    _, cpu = watched(races, 40_000)
+    image = load_hex(races)
+    alone = Cpu()
+    alone.load(image.code, image.used)
+    alone.run(40_000)
+    assert snapshot(cpu) == snapshot(alone)
