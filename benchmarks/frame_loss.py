@@ -22,7 +22,6 @@ from math import exp
 from pathlib import Path
 from typing import NamedTuple
 
-from benchmarks.interval import wilson
 from miro_exact.clock import CONTROL_PERIOD_TICKS
 from miro_exact.rng import Stream
 from miro_protocol.decoder import Decoder, Received
@@ -37,6 +36,7 @@ from miro_robot.wiring import load_wiring
 from miro_sim.radio.downlink import Downlink
 from miro_sim.radio.params import Radio, SlicerParams
 from miro_sim.radio.uplink import Uplink
+from mirotwin.campaign.chances import wilson
 
 LEVELS_DB = (7.0, 8.0, 9.0, 10.0, 11.0, 12.0, 13.0, 14.0)
 FIRST_TICK = 240_000  # after the firmware's start

@@ -1,17 +1,9 @@
-"""Confidence intervals of a probability of which there is a count."""
+"""The exact confidence interval of a probability of which there is a count; Wilson's is `mirotwin.campaign.chances`."""
 
 from __future__ import annotations
 
 from collections.abc import Callable
-from math import exp, lgamma, log, log1p, sqrt
-
-
-def wilson(count: int, trials: int, deviations: float = 1.96) -> tuple[float, float]:
-    """Wilson's interval, for counts that are too large to add binomials up; 95 % unless told."""
-    share, spread = count / trials, deviations * deviations / trials
-    middle = share + spread / 2
-    half = deviations * sqrt(share * (1 - share) / trials + spread / (4 * trials))
-    return (middle - half) / (1 + spread), (middle + half) / (1 + spread)
+from math import exp, lgamma, log, log1p
 
 
 def clopper_pearson(count: int, trials: int, confidence: float = 0.95) -> tuple[float, float]:

@@ -94,6 +94,7 @@ SECTIONS = {
         "summary": Lazy("testing.summary_command", "Makes a page of JUnit reports, for CI."),
         "conform": Lazy("conform.conform_command", "Tries the protocol's rules on a firmware image."),
         "debug": Lazy("debug.debug_command", "Steps through the firmware, forwards and backwards."),
+        "why": Lazy("campaign.why_command", "Finds when the failure of a run became inevitable."),
         "fuzz": Lazy("fuzz.fuzz_command", "Looks for inputs that make a firmware image fail."),
     },
     "Recorded data": {

@@ -104,8 +104,11 @@ class Drawing:
     def add(self, panel: Panel, box: PanelBox) -> None:
         self._parts += _Axes(panel, box).parts()
 
+    def text(self) -> str:
+        return "\n".join([*self._parts, "</svg>"]) + "\n"
+
     def write(self, path: Path) -> None:
-        path.write_text("\n".join([*self._parts, "</svg>"]) + "\n", encoding="utf-8")
+        path.write_text(self.text(), encoding="utf-8")
 
 
 class _Axes:

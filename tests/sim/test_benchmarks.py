@@ -8,12 +8,13 @@ from pathlib import Path
 import pytest
 
 from benchmarks import chain, disturbances, frame_loss, improved, one_frame_page
-from benchmarks.interval import clopper_pearson, wilson
+from benchmarks.interval import clopper_pearson
 from benchmarks.one_frame import Way, edges_of
 from miro_exact.clock import CONTROL_PERIOD_TICKS
 from miro_sim.pitch import ground
 from miro_sim.scenario.build import dead_s
 from miro_sim.scenario.file import load
+from mirotwin.campaign.chances import wilson
 from mirotwin.campaign.single import run_single
 from tests.sim.world.rig import finished, image, world_of
 

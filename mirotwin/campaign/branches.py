@@ -1,0 +1,186 @@
+"""Branches of a run: its world as it was at the end of a control period, with the noise of other seeds from there on.
+
+A branch is a run of its own: the same script with `reseed` in it. Where a process can be copied (`fork`), all branches
+of a moment go on from copies of the one process that came there: of the world, of its checks with all they have seen,
+and of what steps wait for. Elsewhere each branch begins at the first tick, and comes to the same verdict.
+"""
+
+from __future__ import annotations
+
+import gc
+import os
+from collections.abc import Callable, Sequence
+
+import msgspec
+from msgspec.structs import replace
+
+from miro_protocol.actions import Reseed
+from miro_sim.periods import Period
+from miro_sim.world.actions import SETTLE_TICKS
+from mirotwin.campaign.chances import wilson
+from mirotwin.runs.run import Run
+from mirotwin.runs.spec import RunSpec
+from mirotwin.verify.checks.interface import Failure
+
+STEP = "step"
+"""What failed where it was no check."""
+FROM_START = -1
+"""In place of a tick: the seed is another one from the start, with other wheels and another calibration."""
+PASSED, FAILED, BROKEN = 0, 1, 70
+CAN_COPY = hasattr(os, "fork")
+
+
+class Point(msgspec.Struct, frozen=True):
+    """`failed`: for each of the seeds, whether the branch at `tick` failed."""
+
+    tick: int
+    failed: tuple[bool, ...]
+
+    @property
+    def count(self) -> int:
+        return sum(self.failed)
+
+    @property
+    def share(self) -> float:
+        return self.count / len(self.failed)
+
+    @property
+    def interval(self) -> tuple[float, float]:
+        return wilson(self.count, len(self.failed))
+
+
+class _AllBranched(Exception):
+    """The process that is copied has come to its end."""
+
+
+def failure_of(run: Run, name: str = "") -> Failure | None:
+    """The first failure of that check, or of any."""
+    failures = [one for group in run.judges for one in group.failures if name in ("", one.check)]
+    return min(failures, key=lambda one: one.tick, default=None)
+
+
+def has_failed(run: Run, name: str) -> bool:
+    """Whether that check failed; or a step, if that is what failed."""
+    if name == STEP:
+        return run.player is not None and run.player.failure is not None
+    return failure_of(run, name) is not None
+
+
+def branch(spec: RunSpec, tick: int, seed: int) -> RunSpec:
+    """The run whose noise is that of `seed` from the end `tick` of a control period on."""
+    if tick == FROM_START:
+        return replace(spec, seed=seed)
+    lines = range(len(getattr(spec.scenario, "networks", ())) or 1)
+    reseeds = [Reseed(tick + SETTLE_TICKS, line, seed) for line in lines]
+    script = sorted([*(spec.script or ()), *reseeds], key=lambda item: item.tick)
+    return replace(spec, script=script, computed=spec.computed or spec.script is None)
+
+
+def branched(spec: RunSpec, name: str, tick: int, seeds: Sequence[int], jobs: int = 1) -> Point:
+    """What becomes of the branches at `tick`, in `jobs` processes. `name`: of the check that fails."""
+    if not CAN_COPY:
+        return Point(tick, tuple(has_failed(Run(branch(spec, tick, seed)).play(), name) for seed in seeds))
+    shares = [seeds[first::jobs] for first in range(min(jobs, len(seeds)))]
+    pipes = [_copied(lambda share=share: _outcomes(spec, name, tick, share)) for share in shares]  # type: ignore[misc]
+    outcomes = [_answer(*pipe) for pipe in pipes]
+    return Point(tick, tuple(bool(outcomes[at % jobs][at // jobs]) for at in range(len(seeds))))
+
+
+def _copied(work: Callable[[], bytes]) -> tuple[int, int]:
+    """A copy of this process that answers with what `work` gives: its number, and where its answer comes."""
+    reads, writes = os.pipe()
+    process = os.fork()
+    if process:
+        os.close(writes)
+        return process, reads
+    code = BROKEN
+    try:
+        os.close(reads)
+        os.write(writes, work())
+        code = PASSED
+    finally:
+        os._exit(
+            code
+        )  # nothing of the first process is done twice: files are flushed, locks are let go there
+
+
+def _answer(process: int, reads: int) -> bytes:
+    """Raises RuntimeError for a process that broke."""
+    with os.fdopen(reads, "rb") as pipe:
+        answer = pipe.read()
+    _code_of(process, PASSED)
+    return answer
+
+
+def _code_of(process: int, *codes: int) -> int:
+    code = os.waitstatus_to_exitcode(os.waitpid(process, 0)[1])
+    if code not in codes:
+        raise RuntimeError(f"a branch ended with exit code {code}")
+    return code
+
+
+def _outcomes(spec: RunSpec, name: str, tick: int, seeds: Sequence[int]) -> bytes:
+    """PASSED or FAILED for each seed. Copies of this process end here, too."""
+    if tick == FROM_START:
+        return bytes(has_failed(Run(replace(spec, seed=seed)).play(), name) for seed in seeds)
+    run, codes, is_branch = Run(spec), bytearray(), False
+    world = run.world
+
+    def look(period: Period | None) -> None:
+        nonlocal is_branch
+        if is_branch and has_failed(run, name):
+            os._exit(FAILED)
+        if is_branch or world.tick < tick:
+            return
+        gc.freeze()  # a collection in a copy would touch all that it shares with this process, and so copy it
+        for seed in seeds:
+            process = os.fork()
+            if not process:
+                is_branch = True
+                for line in world.lines:
+                    world.do(Reseed(world.earliest_action_tick, line.index, seed))
+                return
+            codes.append(_code_of(process, PASSED, FAILED))
+        raise _AllBranched
+
+    try:
+        look(None)
+        world.observers.append(look)
+        failed = has_failed(run.play(), name)
+    except _AllBranched:
+        return bytes(codes)
+    except BaseException:
+        os._exit(BROKEN)  # with its parent's trace, if it is a branch, there would be one for each
+    if is_branch:
+        os._exit(FAILED if failed else PASSED)
+    return bytes([failed] * len(seeds))  # it was over before that tick
+
+
+def search(
+    branches: Callable[[int], Point], end: int, coarse: int, done: Callable[[Point], object]
+) -> tuple[list[Point], int]:
+    """Points in the order of time, and the index of the control period in which failing became more likely than not.
+
+    `branches`: those at the end of so many control periods; `end`: after that many the check has failed. At first there
+    are about `coarse` points; then the distance is halved in which the last of those below a half is, until that is
+    one control period. -1: it was so from the start.
+    """
+    points: dict[int, Point] = {}
+
+    def look(index: int) -> Point:
+        if index not in points:
+            points[index] = branches(index)
+            done(points[index])
+        return points[index]
+
+    grid = [end * place // coarse for place in range(coarse + 1)]
+    low = max((index for index in grid if look(index).share < 0.5), default=-1)
+    if low >= 0:
+        high = min(index for index in [*grid, end] if index > low)
+        while high - low > 1:
+            middle = (low + high) // 2
+            low, high = (middle, high) if look(middle).share < 0.5 else (low, middle)
+        for index in (low - 2, low - 1, high + 1, high + 2):  # the curve beside the jump
+            if 0 <= index <= end:
+                look(index)
+    return [points[index] for index in sorted(points)], low
