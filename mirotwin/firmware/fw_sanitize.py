@@ -9,10 +9,13 @@ import msgspec
 
 from miro_exact.bad_input import BadInput
 from miro_exact.inputs import decode, read_input
+from miro_robot.empty_board import EmptyBoard
 from miro_robot.inspect.findings import KINDS, Finding, Reader
 from miro_robot.inspect.sanitizer import Sanitizer
 from miro_robot.inspect.sanitizer_layout import layout_of
+from miro_robot.mcs51.chips import CHIPS
 from mirotwin.firmware.subject import SubjectOptions, WindowOptions, look, open_window
+from mirotwin.runs.inspected_run import InspectedRun
 from mirotwin.shell.command import Option, command_of
 from mirotwin.shell.debug_files import with_debug_files
 from mirotwin.shell.json_text import json_bytes
@@ -93,6 +96,20 @@ def verdict_of(finding: Finding) -> str:
     return "fault" if finding.did else "failed"
 
 
+def ram_of(run: InspectedRun) -> int:
+    """Bytes of external RAM; -1 where other things answer to MOVX, or may."""
+    board = run.device.board
+    if (
+        not isinstance(board, EmptyBoard)
+        or board.spec.latches
+        or board.spec.buffers
+        or board.spec.code_in_xram
+    ):
+        return -1
+    inner = CHIPS[board.spec.chip].xram_bytes if board.spec.xram == "internal" else 0
+    return board.spec.xram_bytes if board.spec.xram == "external" else inner
+
+
 @command_of(SanitizeOptions)
 def sanitize(options: SanitizeOptions) -> int:
     """Runs SUBJECT and reports what its firmware does without noticing: variables torn by interrupts, and such.
@@ -108,7 +125,7 @@ def sanitize(options: SanitizeOptions) -> int:
     layout = layout_of(image)
     if not layout.lines:
         complain(f"{image.path.name}: no .cdb beside it: races and overlays are not observable")
-    sanitizer = Sanitizer(layout)
+    sanitizer = Sanitizer(layout, ram_of(run))
     code = look(run, options, sanitizer)
     found, stale = judged(Reader(image, layout).findings(sanitizer), allowed, options.kinds)
     subject = {name: getattr(options, name) for name in SubjectOptions.__struct_fields__ if name != "engine"}

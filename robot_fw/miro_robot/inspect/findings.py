@@ -8,6 +8,7 @@ from pathlib import PureWindowsPath as AnyPath
 import msgspec
 
 from miro_robot.image import Image
+from miro_robot.inspect import sanitizer
 from miro_robot.inspect.sanitizer import LOST, SHARED, TORN_READ, TORN_WRITE, Sanitizer
 from miro_robot.inspect.sanitizer_layout import XRAM, Layout
 from miro_robot.inspect.symbol_names import SymbolNames
@@ -16,6 +17,12 @@ from miro_robot.mcs51.opcodes import INTERRUPTS
 KINDS = {
     "race": "a variable that an interrupt may change between two halves, or whose change it may undo",
     "overlay": "parameters, local and overlaid variables in use at two levels at once",
+    "registers": "a routine that returns with registers or the bank changed",
+    "return": "RET and RETI in each other's place, return addresses overwritten, bytes too many or too few",
+    "stack": "bytes that stay on the stack in each turn of the main loop",
+    "uart": "characters cut off or never read",
+    "timer": "the halves of a running timer read apart",
+    "memory": "MOVX where there is no RAM or nothing was written, MOVC outside of the image, const written",
 }
 """Kinds of findings, and what they are."""
 _SAYS = {
@@ -24,6 +31,25 @@ _SAYS = {
     LOST: "loads {name}, changes and stores it in {function}",
     SHARED: "stores {name} for {function}",
 }
+_NOTES = {
+    sanitizer.REGISTERS: ("registers", "returns with {which} changed"),
+    sanitizer.RET_OF_INTERRUPT: (
+        "return",
+        "leaves the {source} interrupt by RET: no other one of its level comes",
+    ),
+    sanitizer.RETI_OF_CALL: ("return", "leaves a function by RETI: its interrupt counts as over"),
+    sanitizer.OVERWRITTEN: ("return", "returns elsewhere: the return address is overwritten"),
+    sanitizer.UNBALANCED: ("return", "returns with a byte too many or too few on the stack"),
+    sanitizer.LEAK: ("stack", "leaves bytes on the stack in each turn"),
+    sanitizer.CUT_OFF: ("uart", "writes SBUF while a character goes out"),
+    sanitizer.UNREAD: ("uart", "clears RI, and SBUF is not read before the next character"),
+    sanitizer.TIMER: ("timer", "reads the halves of timer {number} apart: the low one may overflow between"),
+    sanitizer.NO_RAM: ("memory", "reaches for {address}, where there is no RAM"),
+    sanitizer.NO_CODE: ("memory", "reads code at {address}, outside of the image"),
+    sanitizer.CONST: ("memory", "writes through a pointer to code"),
+    sanitizer.UNWRITTEN: ("memory", "reads external RAM at {address}, which nothing wrote"),
+}
+_REGISTERS = (*(f"R{number}" for number in range(8)), "A", "B", "DPTR", "CY", "the bank")
 
 
 class Finding(msgspec.Struct, frozen=True, order=True):
@@ -87,6 +113,28 @@ class Reader:
                 between = next((at for touch in touches if (at := touch(source, key)) >= 0), -1)
                 if sources_open >> source & 1 and between >= 0:
                     yield self._race(pair, key, between, tick, source)
+
+        grouped: dict[tuple[int, int], list[tuple[int, int, int]]] = {}
+        for (mistake, pc, other, which), tick in seen.notes.items():
+            grouped.setdefault((mistake, pc), []).append((tick, other, which))
+        for (mistake, pc), each in grouped.items():
+            yield self._mistake(mistake, pc, each)
+
+    def _mistake(self, mistake: int, pc: int, each: list[tuple[int, int, int]]) -> Finding:
+        """`each`: (tick, the other instruction, which one) of the times that differ."""
+        (kind, says), (tick, other, which) = _NOTES[mistake], min(each)
+        changed = [name for number, name in enumerate(_REGISTERS) if number in {one for _, _, one in each}]
+        words = says.format(
+            which=", ".join(changed),
+            source=INTERRUPTS[which % len(INTERRUPTS)],
+            number=which,
+            address=f"{which:04X}h",
+        )
+        return Finding(
+            kind, self.place(pc), "", mistake != sanitizer.TIMER, tick,
+            f"{words}, in {self.function(pc)}", self.function(pc),
+            "" if other < 0 else f"{self.place(other)} in {self.function(other)} goes with it", pc, other,
+        )  # fmt: skip
 
     def _race(
         self, pair: tuple[int, int, int], key: int, between: int, tick: int, source: int, did: bool = False

@@ -3,9 +3,17 @@ cimport cython
 from miro_robot.inspect.watcher cimport Watcher
 from miro_robot.mcs51.cpu cimport Cpu
 from miro_robot.mcs51.interrupts cimport Interrupts
+from miro_robot.mcs51.timers cimport Timers
+from miro_robot.mcs51.uart cimport Uart
 
 cdef int _PLACES, _XRAM, _SCALAR, _LOCAL, _FIRST, _SECOND, _INDIRECT, _DPTR, _PAGE
 cdef int _TORN_READ, _TORN_WRITE, _LOST, _SHARED, _SFRS, _EA
+cdef int _CALL, _RET, _RETI, _PUSH, _CLEAR, _JBC, _MOVC, _MOVX_READ, _MOVX_WRITE
+cdef int _SP, _SCON, _SBUF, _RI_BIT, _RI, _MODES, _TL0, _TH1, _TL2, _TH2
+cdef long long _NEVER
+cdef int _DEEPEST, _GROWTHS, _NEAR, _AGAIN, _IN_CODE
+cdef int _REGISTERS, _RET_OF_INTERRUPT, _RETI_OF_CALL, _OVERWRITTEN, _UNBALANCED, _LEAK
+cdef int _CUT_OFF, _UNREAD, _TIMER, _NO_RAM, _NO_CODE, _CONST, _UNWRITTEN
 
 cdef class Sanitizer(Watcher):
     cdef unsigned char reads[256]
@@ -30,11 +38,27 @@ cdef class Sanitizer(Watcher):
     cdef int level, open, priorities
     cdef int known_pair[65536]
     cdef int known_open[65536]
-    cdef readonly dict pairs, events
+    cdef readonly dict pairs, events, notes
+    cdef int ram, put_generic, a, scon, depth, from_reset, sent_pc, unread, cleared_pc
+    cdef long long sent_tick
+    cdef unsigned char written[65536]
+    cdef unsigned char special[256]
+    cdef int frame_sp[128]
+    cdef int frame_back[128]
+    cdef int frame_entry[128]
+    cdef int frame_source[128]
+    cdef int saved[1664]
+    cdef int leak_sp[65536]
+    cdef int leak_count[65536]
+    cdef long long level_steps[3]
+    cdef int half[9]
+    cdef long long half_step[9]
+    cdef int half_pc[9]
+    cdef int other_pc[9]
     cdef Interrupts interrupts
     cdef long long tick
 
-    @cython.locals(opcode=int, line=int, form=int, place=int)
+    @cython.locals(opcode=int, line=int, form=int, place=int, scon=int)
     cpdef executed(self, Cpu cpu, int pc, long long start)
     @cython.locals(direct=int)
     cdef inline int _place(self, Cpu cpu, int form, int pc, int opcode) noexcept
@@ -48,3 +72,20 @@ cdef class Sanitizer(Watcher):
     cdef _look(self, Cpu cpu)
     cpdef int reader(self, int source, int key) noexcept
     cpdef int writer(self, int source, int key) noexcept
+    cdef _note(self, int mistake, int pc, int other, int which)
+    @cython.locals(timer=int, timers=Timers)
+    cdef _read_register(self, Cpu cpu, int address, int pc)
+    @cython.locals(at=int, passed='long long', first=int)
+    cdef _half(self, int timer, int high, int running, int pc)
+    @cython.locals(uart=Uart)
+    cdef _write_register(self, Cpu cpu, int address, int pc)
+    cdef _received(self)
+    cdef _cleared(self, int pc)
+    @cython.locals(address=int, page=bint)
+    cdef _special(self, Cpu cpu, int special, int pc, int opcode)
+    cdef _grown(self, int sp, int pc)
+    @cython.locals(at=int, register=int)
+    cdef _enter(self, Cpu cpu, int entry, int back, int source)
+    cdef int _register(self, Cpu cpu, int register) noexcept
+    @cython.locals(before=int, below=int, at=int, source=int, register=int)
+    cdef _left(self, Cpu cpu, int pc, int by_reti)

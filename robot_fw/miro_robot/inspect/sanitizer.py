@@ -8,7 +8,7 @@ address of internal RAM, or 256 + one of external RAM. What follows for C is in 
 
 from __future__ import annotations
 
-from miro_robot.inspect.sanitizer_layout import CONSTANT, LOCAL, READS, SCALAR, WRITES, Layout
+from miro_robot.inspect.sanitizer_layout import CONSTANT, LOCAL, READS, SCALAR, SPECIAL, WRITES, Layout
 from miro_robot.inspect.watcher import Watcher
 from miro_robot.mcs51.cpu import Cpu
 
@@ -17,18 +17,26 @@ _XRAM = 256
 _SCALAR, _LOCAL = SCALAR, LOCAL
 _FIRST, _SECOND, _INDIRECT, _DPTR, _PAGE = 1, 2, 3, 4, 5  # see `FORMS`
 _SFRS, _EA = 0x80, 0x80
+_CALL, _RET, _RETI, _PUSH, _CLEAR, _JBC, _MOVC, _MOVX_READ, _MOVX_WRITE = range(1, 10)  # see `SPECIAL`
+_SP, _SCON, _SBUF, _RI_BIT, _RI, _MODES, _NEVER = 0x81, 0x98, 0x99, 0x98, 1, 0xC0, 1 << 61
+_TL0, _TH1, _TL2, _TH2 = 0x8A, 0x8D, 0xCC, 0xCD
+_DEEPEST, _GROWTHS, _NEAR, _AGAIN, _IN_CODE = 128, 3, 8, 12, 0x80
 TORN_READ, TORN_WRITE, LOST, SHARED = 1, 2, 3, 4
+REGISTERS, RET_OF_INTERRUPT, RETI_OF_CALL, OVERWRITTEN, UNBALANCED, LEAK = 1, 2, 3, 4, 5, 6
+CUT_OFF, UNREAD, TIMER, NO_RAM, NO_CODE, CONST, UNWRITTEN = 7, 8, 9, 10, 11, 12, 13
+_REGISTERS, _RET_OF_INTERRUPT, _RETI_OF_CALL, _OVERWRITTEN, _UNBALANCED, _LEAK = 1, 2, 3, 4, 5, 6
+_CUT_OFF, _UNREAD, _TIMER, _NO_RAM, _NO_CODE, _CONST, _UNWRITTEN = 7, 8, 9, 10, 11, 12, 13
 _TORN_READ, _TORN_WRITE, _LOST, _SHARED = TORN_READ, TORN_WRITE, LOST, SHARED
 
 
 class Sanitizer(Watcher):
-    """Of one CPU. `pairs`: (kind, first instruction, second) -> [place, sources that
-    could come between, tick of the second].
-
-    `events`: the same key -> (tick, source << 16 | the instruction that came between, its place) of the first time.
+    """Of one CPU. `pairs`: (kind, first instruction, second) -> [place, sources that could come between, tick of the
+    second]. `events`: the same key -> (tick, source << 16 | the instruction that came between, its place) of the first
+    time. `notes`: (mistake, instruction, another one, which) -> tick of the first time. `ram`: bytes of external RAM;
+    -1: other things answer to MOVX, too.
     """
 
-    def __init__(self, layout: Layout) -> None:
+    def __init__(self, layout: Layout, ram: int = -1) -> None:
         self.reads = READS
         self.writes = WRITES
         self.constant = CONSTANT  # by opcode
@@ -57,6 +65,31 @@ class Sanitizer(Watcher):
         self.tick = 0
         self.pairs: dict[tuple[int, int, int], list[int]] = {}
         self.events: dict[tuple[int, int, int], tuple[int, int, int]] = {}
+        self.ram = ram
+        self.written = bytearray(65536)  # bytes of external RAM
+        self.special = SPECIAL
+        self.put_generic = layout.put_generic
+        self.notes: dict[tuple[int, int, int, int], int] = {}
+        self.a = 0
+        self.scon = 0
+        self.depth = 0  # of the functions and routines that are known to be under way
+        self.frame_sp = [0] * 128  # SP after the call
+        self.frame_back = [0] * 128  # where it has to return to
+        self.frame_entry = [0] * 128
+        self.frame_source = [0] * 128  # 0 of a call, else 1 + source
+        self.saved = [0] * 1664  # registers at interrupts, 13 a frame
+        self.from_reset = 0  # whether frame 0 is that of reset, and no jump went astray
+        self.leak_sp = [0] * 65536
+        self.leak_count = [0] * 65536
+        self.sent_tick = 0
+        self.sent_pc = 0
+        self.unread = 0
+        self.cleared_pc = -1
+        self.level_steps = [0] * 3
+        self.half = [0] * 9  # by level and timer: 1 + which half was read first; 3 more once both were
+        self.half_step = [0] * 9
+        self.half_pc = [0] * 9
+        self.other_pc = [0] * 9
         for address, line in layout.lines.items():
             self.line_of[address] = line
         for place, (kind, key) in layout.places.items():
@@ -65,27 +98,41 @@ class Sanitizer(Watcher):
 
     def attached(self, cpu: Cpu) -> None:
         self.interrupts = cpu.peripherals.interrupts
+        self.scon = cpu.peripherals.uart.scon
+        self.from_reset = 1 if cpu.cycles == 0 else 0
         self._look(cpu)
 
     def executed(self, cpu: Cpu, pc: int, start: int) -> None:
         self.step += 1
+        self.level_steps[self.level] += 1
         opcode = cpu.rom[pc]
         line = self.line_of[pc]
         if line != self.line[self.level]:
             self.line[self.level] = line
             self.began[self.level] = self.step
+        self.tick = 12 * start
         form = self.reads[opcode]
         if form:
             place = self._place(cpu, form, pc, opcode)
-            if place >= 0 and self.kind_of[place]:
-                self.tick = 12 * start
+            if place < 0:
+                self._read_register(cpu, -place, pc)
+            elif self.kind_of[place]:
                 self._read(place, pc)
         form = self.writes[opcode]
         if form:
             place = self._place(cpu, form, pc, opcode)
-            if place >= 0 and self.kind_of[place]:
-                self.tick = 12 * start
+            if place < 0:
+                self._write_register(cpu, -place, pc)
+            elif self.kind_of[place]:
                 self._write(place, pc, self.constant[opcode])
+        if self.special[opcode]:
+            self._special(cpu, self.special[opcode], pc, opcode)
+        scon = cpu.peripherals.uart.scon
+        if scon != self.scon:
+            if scon & ~self.scon & _RI:
+                self._received()
+            self.scon = scon
+        self.a = cpu.a
         self._look(cpu)
 
     def interrupted(self, cpu: Cpu, source: int, pc: int, start: int) -> None:
@@ -93,9 +140,14 @@ class Sanitizer(Watcher):
         self._look(cpu)
         self.serving[self.level] = source
         self.line[self.level] = -1
+        scon = cpu.peripherals.uart.scon
+        if scon & ~self.scon & _RI:
+            self._received()
+        self.scon = scon
+        self._enter(cpu, cpu.pc, pc, 1 + source)
 
     def _place(self, cpu: Cpu, form: int, pc: int, opcode: int) -> int:
-        """Of an operand, after its instruction; -1 for a register of the chip."""
+        """Of an operand, after its instruction; the negative address of a register of the chip."""
         if form == _INDIRECT:
             return cpu.iram[cpu.bank + (opcode & 1)]
         if form == _DPTR:
@@ -103,7 +155,7 @@ class Sanitizer(Watcher):
         if form == _PAGE:
             return _XRAM + (cpu.page() << 8 | cpu.iram[cpu.bank + (opcode & 1)])
         direct = cpu.rom[pc + form]
-        return direct if direct < _SFRS else -1
+        return direct if direct < _SFRS else -direct
 
     def _read(self, place: int, pc: int) -> None:
         level = self.level
@@ -193,3 +245,169 @@ class Sanitizer(Watcher):
     def writer(self, source: int, key: int) -> int:
         """Where the routine of `source` first wrote it; -1 if it never did."""
         return self.writers[source * _PLACES + key] - 1
+
+    def _note(self, mistake: int, pc: int, other: int, which: int) -> None:
+        if (mistake, pc, other, which) not in self.notes:
+            self.notes[mistake, pc, other, which] = self.tick
+
+    # Registers of the chip
+
+    def _read_register(self, cpu: Cpu, address: int, pc: int) -> None:
+        if address == _SBUF:
+            self.unread = 0
+            self.cleared_pc = -1
+        elif _TL0 <= address <= _TH1:
+            timer = (address - _TL0) & 1
+            timers = cpu.peripherals.timers
+            if not timers.tmod >> 4 * timer & 2:  # one count over both bytes
+                self._half(timer, address > _TL0 + 1, timers.control >> 2 * timer & 0x10, pc)
+        elif _TL2 <= address <= _TH2:
+            self._half(2, address == _TH2, cpu.peripherals.timer2.control & 4, pc)
+
+    def _half(self, timer: int, high: int, running: int, pc: int) -> None:
+        """One half of a count was read. Right is to read the first one again after the other, or to stop the timer."""
+        at = 3 * self.level + timer
+        passed = self.level_steps[self.level] - self.half_step[at]
+        first = self.half[at]
+        if first >= 3:  # both were read
+            if high + 4 == first and passed <= _AGAIN:
+                self.half[at] = 0
+                return
+            self._note(_TIMER, self.half_pc[at], self.other_pc[at], timer)
+        elif first and high + 1 != first and passed <= _NEAR and running:
+            self.half[at] = first + 3
+            self.other_pc[at] = pc
+            self.half_step[at] = self.level_steps[self.level]
+            return
+        self.half[at] = high + 1
+        self.half_pc[at] = pc
+        self.half_step[at] = self.level_steps[self.level]
+
+    def _write_register(self, cpu: Cpu, address: int, pc: int) -> None:
+        if address == _SP:
+            while self.depth and self.frame_sp[self.depth - 1] > cpu.sp:
+                self.depth -= 1
+        elif address == _SBUF:
+            uart = cpu.peripherals.uart
+            if self.tick < self.sent_tick < _NEVER:
+                self._note(_CUT_OFF, pc, self.sent_pc, 0)
+            self.sent_tick = uart.ti_tick() if uart.scon & _MODES else 0
+            self.sent_pc = pc
+        elif address == _SCON and self.scon & ~cpu.peripherals.uart.scon & _RI:
+            self._cleared(pc)
+
+    def _received(self) -> None:
+        """RI went up; a character whose RI was cleared and which nobody has read is lost by then."""
+        if self.unread and self.cleared_pc >= 0:
+            self._note(_UNREAD, self.cleared_pc, -1, 0)
+        self.unread = 1
+        self.cleared_pc = -1
+
+    def _cleared(self, pc: int) -> None:
+        if self.unread:
+            self.cleared_pc = pc
+
+    # Calls and returns, code and external RAM
+
+    def _special(self, cpu: Cpu, special: int, pc: int, opcode: int) -> None:
+        if special == _CALL:
+            self._grown(cpu.sp - 2, pc)
+            if cpu.pc == self.put_generic and cpu.b & _IN_CODE:
+                self._note(_CONST, pc, -1, 0)
+            self._enter(cpu, cpu.pc, pc + (3 if opcode == 0x12 else 2), 0)
+        elif special in (_RET, _RETI):
+            self._left(cpu, pc, special == _RETI)
+        elif special == _PUSH:
+            self._grown(cpu.sp, pc)
+        elif special == _CLEAR:
+            if cpu.rom[pc + 1] == _RI_BIT and self.scon & _RI:
+                self._cleared(pc)
+        elif special == _JBC:
+            if cpu.rom[pc + 1] == _RI_BIT and cpu.pc != (pc + 3) & 0xFFFF:
+                if not self.scon & _RI:  # it went up in this instruction
+                    self._received()
+                self._cleared(pc)
+        elif special == _MOVC:
+            address = (self.a + (cpu.dptr if opcode == 0x93 else pc + 1)) & 0xFFFF
+            if not cpu.is_loaded(address):
+                self._note(_NO_CODE, pc, -1, address)
+        elif self.ram >= 0:
+            page = opcode & 0xF == 2 or opcode & 0xF == 3
+            address = cpu.page() << 8 | cpu.iram[cpu.bank + (opcode & 1)] if page else cpu.dptr
+            if address >= self.ram:
+                self._note(_NO_RAM, pc, -1, address)
+            elif special == _MOVX_WRITE:
+                self.written[address] = 1
+            elif not self.written[address]:
+                self._note(_UNWRITTEN, pc, -1, address)
+
+    def _grown(self, sp: int, pc: int) -> None:
+        """In the frame of reset the stack is as high at an instruction each time, unless something stays on it."""
+        if self.depth or self.level or not self.from_reset:
+            return
+        if self.leak_sp[pc] and sp > self.leak_sp[pc]:
+            self.leak_count[pc] += 1
+            if self.leak_count[pc] == _GROWTHS:
+                self._note(_LEAK, pc, -1, 0)
+        self.leak_sp[pc] = sp
+
+    def _enter(self, cpu: Cpu, entry: int, back: int, source: int) -> None:
+        while self.depth and self.frame_sp[self.depth - 1] > cpu.sp - 2:
+            self.depth -= 1
+        if self.depth == _DEEPEST:
+            self.depth = self.from_reset = 0
+        at = self.depth
+        self.frame_sp[at] = cpu.sp
+        self.frame_back[at] = back & 0xFFFF
+        self.frame_entry[at] = entry
+        self.frame_source[at] = source
+        self.depth += 1
+        if source:
+            for register in range(13):
+                self.saved[13 * at + register] = self._register(cpu, register)
+
+    def _register(self, cpu: Cpu, register: int) -> int:
+        """R0 to R7, A, B, DPTR, CY, the bank."""
+        if register < 8:
+            return cpu.iram[cpu.bank + register]
+        if register < 10:
+            return cpu.a if register == 8 else cpu.b
+        if register == 10:
+            return cpu.dptr
+        return cpu.cy if register == 11 else cpu.bank
+
+    def _left(self, cpu: Cpu, pc: int, by_reti: int) -> None:
+        """RET or RETI went somewhere; what was pushed and not popped makes it a jump, unless one byte is left."""
+        before = cpu.sp + 2
+        below = -1
+        while self.depth and self.frame_sp[self.depth - 1] > before:
+            self.depth -= 1
+            below = self.frame_sp[self.depth] - 2
+        if self.depth:
+            below = self.frame_sp[self.depth - 1]
+        if below < 0 or before - below > 1:
+            return
+        at = self.depth - 1
+        if at >= 0 and before - below == 1 and self.frame_back[at] == cpu.pc:
+            self.depth = at  # it leaves a byte to its caller
+            return
+        if before - below == 1:
+            self._note(_UNBALANCED, pc, self.frame_entry[max(at, 0)], 0)
+        elif at < 0:
+            return
+        elif self.frame_back[at] != cpu.pc:
+            self._note(_OVERWRITTEN, pc, self.frame_entry[at], 0)
+        else:
+            self.depth = at
+            source = self.frame_source[at]
+            if source and not by_reti:
+                self._note(_RET_OF_INTERRUPT, pc, -1, source - 1)
+            elif by_reti and not source and self.frame_entry[at] != pc:
+                self._note(_RETI_OF_CALL, pc, self.frame_entry[at], 0)
+            for register in range(12, -1, -1) if source else range(0):
+                if self.saved[13 * at + register] != self._register(cpu, register):
+                    self._note(_REGISTERS, pc, self.frame_entry[at], register)
+                    if register == 12:  # those of the other bank are no news
+                        break
+            return
+        self.depth = self.from_reset = 0  # from here on it may be anywhere

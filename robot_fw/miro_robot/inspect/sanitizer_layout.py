@@ -28,12 +28,19 @@ READS = bytes(next((FORMS[word] for word in READS_BY_ROW[ROW[op]] if word in FOR
 WRITES = bytes(FORMS[written_form(ROW[op])] for op in range(256))
 CONSTANT = bytes(ROW[op] in _INDIVISIBLE | _IMMEDIATE for op in range(256))
 """By opcode: what it reads and writes of memory, and whether what it writes follows from itself alone."""
+_SPECIAL = {
+    0x11: 1, 0x12: 1, 0x22: 2, 0x32: 3, 0xC0: 4, 0xC2: 5, 0x10: 6, 0x83: 7, 0x93: 7, 0xE0: 8, 0xE2: 8, 0xF0: 9, 0xF2: 9,
+}  # fmt: skip
+SPECIAL = bytes(_SPECIAL.get(ROW[op], 0) for op in range(256))
+"""Calls 1, RET 2, RETI 3, PUSH 4, CLR bit 5, JBC 6, MOVC 7, MOVX 8 and 9."""
+_PUT_GENERIC = "__gptrput"
 
 
 class Layout(msgspec.Struct, frozen=True, eq=False):
     """`lines`: instruction -> a number of its C line; `places`: place -> (kind, key), of which a scalar's bytes share
     one, its first place; `names`: key -> the variable's name; `local_names`: (key, function) -> the name there;
-    `elements`: keys of numbers in arrays.
+    `elements`: keys of numbers in arrays; `put_generic`:
+    where SDCC's store through a generic pointer is, -1 without it.
     """
 
     lines: dict[int, int]
@@ -41,6 +48,7 @@ class Layout(msgspec.Struct, frozen=True, eq=False):
     names: dict[int, str]
     local_names: dict[tuple[int, str], str]
     elements: set[int]
+    put_generic: int
     debug: DebugInfo
 
 
@@ -72,7 +80,8 @@ def layout_of(image: Image) -> Layout:
             names[base + offset] = name
             if variable.type.kind == "array":
                 elements.add(base + offset)
-    return Layout(lines, places, names, local_names, elements, debug)
+    put = image.symbols.names.get(_PUT_GENERIC)
+    return Layout(lines, places, names, local_names, elements, -1 if put is None else put.address, debug)
 
 
 def _shared(image: Image) -> tuple[dict[int, tuple[int, int]], dict[tuple[int, str], str]]:
