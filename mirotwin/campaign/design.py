@@ -114,7 +114,7 @@ class DesignPoint(msgspec.Struct, frozen=True):
 
 
 class Design(msgspec.Struct, frozen=True):
-    """All runs of a campaign. `draw_count` is 1 where nothing is drawn."""
+    """All runs of a campaign. `draw_count` is 1 where nothing is drawn, 0 where each seed has a draw of its own."""
 
     first_seed: int
     seed_count: int
@@ -125,7 +125,7 @@ class Design(msgspec.Struct, frozen=True):
 
     @property
     def runs(self) -> int:
-        count = self.seed_count * self.draw_count
+        count = self.seed_count * max(self.draw_count, 1)
         for factor in self.factors:
             count *= len(factor.levels)
         return count
@@ -138,13 +138,15 @@ class Design(msgspec.Struct, frozen=True):
     def point(self, run: int) -> DesignPoint:
         """The design point of run number `run`, from 0."""
         rest, seed = divmod(run, self.seed_count)
-        rest, draw = divmod(rest, self.draw_count)
+        rest, draw = divmod(rest, max(self.draw_count, 1))
         levels: list[Level] = []
         for factor in reversed(self.factors):
             rest, level = divmod(rest, len(factor.levels))
             levels.append(factor.levels[level])
-        drawn = tuple(one.value(self.draw_seed, draw) for one in self.draws)
-        return DesignPoint(tuple(reversed(levels)), drawn, draw, self.first_seed + seed)
+        run_seed = self.first_seed + seed
+        draw_seed = self.draw_seed if self.draw_count else run_seed
+        drawn = tuple(one.value(draw_seed, draw) for one in self.draws)
+        return DesignPoint(tuple(reversed(levels)), drawn, draw, run_seed)
 
     def settings(self, point: DesignPoint) -> tuple[str, ...]:
         """The settings of a point, in the order of the file."""

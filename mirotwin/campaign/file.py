@@ -29,9 +29,9 @@ NOT_VARIED = ("name", "title", "network", "board", "step", "expect", "seed")
 
 
 class Random(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
-    """`[random]`."""
+    """`[random]`. `count` 0: one draw for each seed of the runs, by that seed."""
 
-    count: Annotated[int, Meta(ge=1, le=MOST_RUNS)]
+    count: Annotated[int, Meta(ge=0, le=MOST_RUNS)] = 0
     seed: Annotated[int, Meta(ge=0, le=MAX_SEED)] = 0
     range: dict[str, Any] = {}
 
@@ -56,7 +56,7 @@ _OF_OTHERS = {"board", "chip", "crystal_hz", "duration_s", "network"}
 
 
 def builtin_names() -> list[str]:
-    """Campaigns that are part of the program: `mirotwin campaign bench1`."""
+    """Campaigns that are part of the program: `mirotwin campaign bench2`."""
     return sorted(path.stem for path in BUILTIN.glob("*.toml"))
 
 
@@ -181,6 +181,8 @@ def _factors(table: dict[str, dict[str, list[str]]]) -> Iterator[Factor]:
 def _draws(random: Random) -> Iterator[Draw]:
     if not random.range:
         raise TomlError("says nothing to draw", "give KEY = { from = .., to = .. }", "random.range")
+    if random.seed and not random.count:
+        raise TomlError("has no effect: without count each seed draws its own", "give count", "random.seed")
     for key, value in _leaves(random.range, is_range):
         try:
             yield draw_of(key, value)
