@@ -21,7 +21,7 @@ ROOT = Path(__file__).parents[1]
 DOCS = ROOT / "docs"
 MODULES = {
     "theory.md": ("tests.sim.theory_page", "--write"),
-    "benchmark.md": ("benchmarks.bench2", "--write", "docs/benchmark.md"),
+    "benchmark.md": ("benchmarks.bench2", "--run", "--write", "docs/benchmark.md"),
     "gains.md": ("benchmarks.gains", "--write", "docs/gains.md"),
 }
 REPRODUCTION = "reproduction.md"

@@ -56,7 +56,7 @@ class CampaignOptions(Options, frozen=True, kw_only=True):
 
 @command_of(CampaignOptions)
 def run(options: CampaignOptions) -> int:
-    """Makes the runs of FILE.toml, or of the built-in campaign `bench1`, and writes a row for each to a Parquet file.
+    """Makes the runs of FILE.toml, or of the built-in campaign `bench2`, and writes a row for each to a Parquet file.
 
     A campaign that is broken off goes on when the same command is given again; nothing but the runs under way is lost
     (FILE.part.jsonl). The file is the same whatever ran it, byte for byte; how long the runs took is in

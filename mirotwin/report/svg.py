@@ -107,6 +107,10 @@ class Drawing:
     def text(self) -> str:
         return "\n".join([*self._parts, "</svg>"]) + "\n"
 
+    def legend(self, panel: Panel, x: float, y: float) -> None:
+        """The names of a panel's lines in a column, for panels that have the same lines."""
+        self._parts += [_name(mark, x, y + 17 * row) for row, mark in enumerate(panel.marks)]
+
     def write(self, path: Path) -> None:
         path.write_text(self.text(), encoding="utf-8")
 
@@ -200,15 +204,16 @@ class _Axes:
         right = self.box.x + self.box.width
         if sum(widths) + LETTER * len(self.panel.title) <= self.box.width:
             starts = [right - sum(widths[index:]) + 8 for index in range(len(named))]
-            return [self._name(mark, x, self.box.y - 8) for mark, x in zip(named, starts, strict=True)]
+            return [_name(mark, x, self.box.y - 8) for mark, x in zip(named, starts, strict=True)]
         left = right - max(widths)
         back = _rect("legend", left - 6, self.box.y + 4, max(widths) + 2, 17.0 * len(named) + 5)
-        return [back] + [self._name(mark, left, self.box.y + 19 + 17 * row) for row, mark in enumerate(named)]
+        return [back] + [_name(mark, left, self.box.y + 19 + 17 * row) for row, mark in enumerate(named)]
 
-    def _name(self, mark: Stroke, x: float, y: float) -> str:
-        shape = f"M{x + 9:.1f} {y - 4:.1f}h0" if mark.style == "dots" else f"M{x:.1f} {y - 4:.1f}h18"
-        sample = f'<path class="{mark.style}" style="stroke:var(--c{mark.colour})" d="{shape}"/>'
-        return sample + _text(x + 24, y, mark.label, "small", sub=False)
+
+def _name(mark: Stroke, x: float, y: float) -> str:
+    shape = f"M{x + 9:.1f} {y - 4:.1f}h0" if mark.style == "dots" else f"M{x:.1f} {y - 4:.1f}h18"
+    sample = f'<path class="{mark.style}" style="stroke:var(--c{mark.colour})" d="{shape}"/>'
+    return sample + _text(x + 24, y, mark.label, "small", sub=False)
 
 
 def ticks(low: float, high: float, most: float) -> list[tuple[float, str]]:

@@ -2,6 +2,8 @@
 
 import contextlib
 import hashlib
+import itertools
+import math
 import re
 import tomllib
 from pathlib import Path
@@ -12,6 +14,10 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from miro_exact.bad_input import BadInput
+from miro_host.posture import Posture
+from miro_sim.pitch import ground
+from miro_sim.scenario.build import reference_for
+from miro_sim.scenario.file import parse as scenario_of
 from mirotwin.campaign.columns import FIGURES
 from mirotwin.campaign.design import Design, Draw, Factor, Level, inline
 from mirotwin.campaign.file import BUILTIN, load, parse
@@ -103,6 +109,26 @@ def test_a_drawn_value_gets_into_its_run_and_its_column():
         f"host.compute_s={columns['host.compute_s']!r}",
         f"host.word_bits={columns['host.word_bits']}",
     )
+
+
+def test_without_a_count_each_seed_draws_its_own_for_all_levels_wherever_the_seeds_begin():
+    text = 'scenario = "fig6"\nseeds = "{}"\n[grid]\nscenario = ["fig6", "fig8"]\n[random.range]\nhost.compute_s = {}\n'
+    drawn = {}
+    for seeds in ("3-5", "5-6"):
+        plan = plan_of(text.format(seeds, "{ from = 0.001, to = 0.02 }"))
+        assert plan.runs == 2 * len(seeds_of(seeds))
+        for run in range(plan.runs):
+            columns = plan.varied(run)
+            value = drawn.setdefault(columns["seed"], columns["host.compute_s"])
+            assert columns["host.compute_s"] == value
+            assert f"host.compute_s={value!r}" in plan.work(run).settings
+    assert len(set(drawn.values())) == len(drawn) == 4
+
+
+def test_a_seed_of_draws_without_their_count_is_refused():
+    text = 'scenario = "fig6"\n[random]\nseed = 1\n[random.range]\nhost.compute_s = { from = 0.001, to = 0.02 }\n'
+    with pytest.raises(BadInput, match=r"random\.seed: has no effect"):
+        plan_of(text)
 
 
 def test_firmware_and_scenarios_are_factors_too(tmp_path):
@@ -215,7 +241,7 @@ def test_ranges_of_seeds_may_be_as_long_as_is_said():
         seeds_of("0-9", 9)
 
 
-# Mirotwin-Bench 1: its fixed scenarios, and what an entry gets
+# The benchmarks: their fixed scenarios, and what an entry gets
 
 PAGE = (ROOT / "docs" / "benchmark.md").read_text(encoding="utf-8")
 BRIEF = "duration_s=0.3"
@@ -224,8 +250,8 @@ SHOWN = ("rms_position_cm", "seen_position_cm", "settling_s", "unsettled", "chat
 
 
 def fixed():
-    """File of each scenario -> SHA-256, as the page has them."""
-    return dict(re.findall(r"^\| `(bench1/\w+\.toml)` \|.*\| `([0-9a-f]{12})` \|$", PAGE, re.M))
+    """Each file of a benchmark -> SHA-256, as the page has them."""
+    return dict(re.findall(r"^\| `(bench[\w/-]+\.toml)` \|.*\| `([0-9a-f]{12})` \|$", PAGE, re.M))
 
 
 @pytest.mark.parametrize(
@@ -241,17 +267,33 @@ def test_the_campaign_files_of_the_tree_can_be_run(name, runs):
     assert load(ROOT / name).runs == runs
 
 
-def test_the_scenarios_are_those_whose_hashes_the_page_has():
-    files = sorted((BUILTIN / "bench1").glob("*.toml"))
-    now = {f"bench1/{path.name}": hashlib.sha256(path.read_bytes()).hexdigest()[:12] for path in files}
-    assert now == fixed(), "another scenario is another benchmark: bench2"
+def test_the_files_are_those_whose_hashes_the_page_has():
+    files = {path.relative_to(BUILTIN).as_posix(): path.read_bytes() for path in BUILTIN.rglob("*.toml")}
+    now = {name: hashlib.sha256(content).hexdigest()[:12] for name, content in files.items()}
+    assert now == fixed(), "another file is another benchmark: bench3"
 
 
-def test_the_benchmark_has_five_scenarios_with_fifty_seeds_each():
-    plan = load("bench1")
-    assert plan.runs == 250
-    assert {plan.varied(number)["scenario"] for number in range(plan.runs)} == set(fixed())
-    assert [plan.varied(number)["seed"] for number in range(50)] == list(range(50))
+@pytest.mark.parametrize(("name", "seeds"), [("bench1", range(50)), ("bench2", range(5000, 5020))])
+def test_a_benchmark_runs_all_its_scenarios_with_the_same_seeds(name, seeds):
+    plan = load(name)
+    columns = [plan.varied(number) for number in range(plan.runs)]
+    assert {one["scenario"] for one in columns} == {one for one in fixed() if one.startswith(f"{name}/")}
+    for scenario in {one["scenario"] for one in columns}:
+        assert {one["seed"] for one in columns if one["scenario"] == scenario} == set(seeds)
+
+
+@pytest.mark.parametrize("name", ["bench2", "bench2-noise"])
+def test_wherever_a_start_is_drawn_the_robot_stands_on_the_pitch(name):
+    plan = load(name)
+    names = [f"network.robot.start_error_{key}" for key in ("x_cm", "y_cm", "theta_rad")]
+    ends = {draw.name: draw.ends() for draw in plan.design.draws}
+    assert list(ends) == names
+    for text in plan.scenarios.values():
+        path = reference_for(scenario_of(text, name).networks[0].robot[0], 1.0)
+        at = path.at(0.0).posture
+        for x_cm, y_cm in itertools.product(ends[names[0]], ends[names[1]]):
+            corner = Posture(at.x_m + x_cm / 100.0, at.y_m + y_cm / 100.0, math.pi / 4.0)  # reaches furthest
+            assert ground.holds(corner)
 
 
 def test_the_plan_is_the_same_wherever_the_program_is_installed(tmp_path):
