@@ -12,6 +12,7 @@ from msgspec.structs import replace
 
 from miro_exact.bad_input import amount
 from mirotwin.campaign import running
+from mirotwin.campaign.chances import clean_line
 from mirotwin.campaign.file import MOST_RUNS, load
 from mirotwin.campaign.journal import journal_path
 from mirotwin.campaign.plan import Plan
@@ -20,7 +21,7 @@ from mirotwin.campaign.results import counted, require_arrow
 from mirotwin.campaign.running import Tally
 from mirotwin.campaign.worker import RunOutcome
 from mirotwin.campaign.workers import Processes
-from mirotwin.shell.command import Argument, Option, Options, command_of
+from mirotwin.shell.command import Argument, Option, Options, Word, command_of
 from mirotwin.shell.options import FORCE, JOBS, OUT, PATH, QUIET, SET, Engine
 from mirotwin.shell.outputs import told_when_full
 from mirotwin.shell.plugin_files import PluginFiles
@@ -31,6 +32,16 @@ from mirotwin.verify.expectations import Expected, as_settings
 
 LINES = 5
 """Runs that went wrong are named, so many at most."""
+
+
+def _share(text: str) -> tuple[int, int]:
+    failed, _, seeds = text.partition("/")
+    if not (failed.isdecimal() and seeds.isdecimal() and 0 < int(failed) <= int(seeds)):
+        raise ValueError(f"{text[:40]!r} is not FAILED/SEEDS, such as 2/50")
+    return int(failed), int(seeds)
+
+
+_WAS = Word("share", _share, lambda share: f"{share[0]}/{share[1]}")
 
 
 class CampaignOptions(Options, frozen=True, kw_only=True):
@@ -47,6 +58,14 @@ class CampaignOptions(Options, frozen=True, kw_only=True):
     ] = ()
     expected: Expected = ()
     plugins: PluginFiles = PluginFiles()
+    was: Annotated[
+        tuple[int, int] | None,
+        Option(
+            type=_WAS,
+            metavar="FAILED/SEEDS",
+            help="Before a fix so many seeds failed: say whether enough of them are clean to believe in it.",
+        ),
+    ] = None
     jobs: Annotated[int | None, JOBS] = None
     engine: Engine = None
     force: Annotated[bool, FORCE.saying("Replace results that are there, or parts of them.")] = False
@@ -61,6 +80,8 @@ def run(options: CampaignOptions) -> int:
     A campaign that is broken off goes on when the same command is given again; nothing but the runs under way is lost
     (FILE.part.jsonl). The file is the same whatever ran it, byte for byte; how long the runs took is in
     FILE.wall.parquet.
+
+    Where no run fails, a line says which failure rate that leaves possible.
 
     Exit code 2: a run has an error; 3: the firmware did what it must not; 1: more runs than allowed_failed_share failed
     a check, or had no occasion for it. The rows say which.
@@ -84,7 +105,10 @@ def run(options: CampaignOptions) -> int:
         show_line(f"{amount(tally.runs, 'run')} ({now}): {results}")
     elif not options.quiet:
         show_line(f"{results} has all {amount(plan.runs, 'run')} already")
-    return _judge(plan, results)
+    code = _judge(plan, results)
+    if not options.quiet and set(counted(results, 0)) == {"passed"}:
+        show_line(clean_line(plan.design.seed_count, options.was))
+    return code
 
 
 def _run(plan: Plan, results: Path, options: CampaignOptions) -> Tally:

@@ -58,9 +58,18 @@ def here(tmp_path, monkeypatch):
 def test_a_file_is_run_with_one_line_and_then_is_there_already(here):
     out = mirotwin.succeeds("campaign", "short.toml", "--jobs", 1, "--seeds", "3-4")
     assert out.startswith("4 runs (4 of them now, in ")
+    assert out.endswith("2 clean seeds: failure rate below 78 % at 95 %\n")
+    out = mirotwin.succeeds("campaign", "short.toml", "--jobs", 1, "--seeds", "3-4", "--was", "19/20")
+    assert out.endswith("; at the old rate of 19/20 a fix needs 1: fixed\n")
     assert len(rows(here / "runs/short.parquet")) == 4
     again = mirotwin.succeeds("campaign", "run", "short.toml", "--seeds", "3-4")
-    assert again == "runs/short.parquet has all 4 runs already\n"
+    assert again.splitlines()[0] == "runs/short.parquet has all 4 runs already"
+
+
+@pytest.mark.parametrize("was", ["3", "0/5", "6/5", "1/0", "-1/5", "a/b", "1/5/9"])
+def test_what_failed_before_a_fix_is_a_share(here, was):
+    _, _, err = mirotwin("campaign", "short.toml", "--was", was)
+    assert f"{was!r} is not FAILED/SEEDS, such as 2/50" in err
 
 
 @pytest.mark.parametrize(
