@@ -3,7 +3,7 @@
     reproduction.md  the paper's claims, and which law is better        minutes
     theory.md        the numbers and tables of the theory's page        minutes
     benchmark.md     Mirotwin-Bench 2                                   half an hour
-    gains.md         the same searches for the gains of both laws       an hour or two
+    gains.md         the same searches for the gains of both laws       half an hour
 
 Each is written by a command of its own, whose tests run its parts. The same tree gives the same bytes.
 """
