@@ -1,6 +1,6 @@
 """Mirotwin-Bench 2: its baselines, run again, and kept with figures and digests in `leaderboard.json`.
 
-    python -m benchmarks.bench2 --run                        # runs that build/bench2 lacks, then the file: 40 minutes
+    python -m benchmarks.bench2 --run                        # runs that build/bench2 lacks, then the file: 20 minutes
     python -m benchmarks.bench2 --check [--draw WORD]        # a run of each entry and case again; WORD draws the seeds
     python -m benchmarks.bench2 --write docs/benchmark.md    # the tables of the page, and its picture
     python -m benchmarks.bench2 --compare mine.parquet --with "body_frame, ekf"    # either may be a file of results

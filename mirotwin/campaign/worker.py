@@ -8,7 +8,7 @@ from __future__ import annotations
 import os
 import socket
 from collections.abc import Mapping
-from functools import cache
+from functools import cache, lru_cache
 
 import msgspec
 
@@ -80,7 +80,7 @@ def work(job: Work) -> RunOutcome:
     return run_single(job)
 
 
-@cache
+@lru_cache(maxsize=1)  # the last ones are there; others take their place
 def _bring(files: tuple[tuple[str, tuple[str, ...]], ...]) -> None:
     if any(given for _, given in files):
         from mirotwin.shell.plugin_files import PluginFiles  # loads hot modules

@@ -10,6 +10,7 @@ import pytest
 from benchmarks import bench2, bench2_page
 from benchmarks.bench2_score import compared
 from miro_exact.bad_input import BadInput
+from mirotwin.campaign import worker
 from mirotwin.campaign.single import run_single
 from tests import children
 
@@ -92,6 +93,19 @@ def test_a_short_run_is_again_what_the_leaderboard_says(entry):
         of_row.camera_cm[number],
         of_row.digests[number],
     )
+
+
+def test_laws_of_two_files_take_turns_in_one_worker():
+    rows = [
+        one
+        for one in ROWS
+        if one.entry in ("samson, none", "pure_pursuit, none") and one.case == "line, plain"
+    ]
+    for row_of, number, job in [
+        *bench2.drawn(rows, "a"),
+        *bench2.drawn(rows, "b"),
+    ]:  # other seeds: nothing is cached
+        assert bench2.shown(worker.work(job))[-1] == row_of.digests[number]
 
 
 @pytest.mark.slow
