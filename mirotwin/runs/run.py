@@ -34,6 +34,7 @@ from mirotwin.verify.checks.happens import expect_of
 from mirotwin.verify.checks.interface import Failure
 from mirotwin.verify.checks.monitors import Checks
 from mirotwin.verify.checks.sleep import Sleep
+from mirotwin.verify.effect import Proof
 from mirotwin.verify.steps.keys import ConditionStep, HoldStep, WaitStep
 from mirotwin.verify.steps.player import Player, player_of
 
@@ -52,7 +53,8 @@ class Run:
     """`world`: one of the spec that nobody has moved, or that was moved to where the checks are to begin.
 
     `trace`: what goes into it, None where nobody needs it as a case. `player`: that of its steps. `periods`: those that
-    `play` came past. `tick`: where the run ended, -1 while it goes on. `is_session`: a live one, which somebody ends.
+    `play` came past. `proofs`: of the hardware faults, that each changed something. `tick`: where the run ended, -1
+    while it goes on. `is_session`: a live one, which somebody ends.
     """
 
     def __init__(self, spec: RunSpec, world: World | None = None, trace: Trace | None = None) -> None:
@@ -61,6 +63,7 @@ class Run:
         self.trace = trace
         self.checks = Checks(self.world, spec.checks(), spec.cut)
         self.player: Player | None = player_of(self.world, spec.steps, spec.origin)
+        self.proofs: list[Proof] = self.player.proofs if self.player is not None else []
         self.periods: list[Period] = []
         self.tick = -1
         self.is_session = False
@@ -182,8 +185,11 @@ class Run:
             lines.insert(0, ("failed", f"step failed: {player.failure}"))
         lines += fault_lines(world.devices, NEVER_TICK if self.spec.until_tick is None else self.tick)
         lines += [("passed", note) for device in world.devices for note in device.notes()]
+        missing = [proof.missing(self.spec.world) for proof in self.proofs]
+        lines += [("not judged", line) for line in missing if line]
         parts = [group.verdict() for group in self.judges]
         parts += [verdict for verdict, _ in lines if verdict in ("fault", "failed")]
+        parts += ["not judged" for line in missing if line]
         return Result(
             path=self.spec.origin,
             verdict=judge(parts),

@@ -5,6 +5,7 @@ from __future__ import annotations
 from typing import Any
 
 from miro_exact.clock import ms
+from miro_protocol.actions import Fault, fault_text
 from miro_robot.faults import FirmwareFault
 from miro_robot.inspect.values import read_value, write_value
 from miro_sim.world.conditions import Condition, Reached, When
@@ -13,6 +14,7 @@ from miro_sim.world.waits import WaitExpired, Waits
 from miro_sim.world.world import World
 from mirotwin.shell.firmware_image import is_up
 from mirotwin.testing.waiting import WaitFailed, shown_where_it_was_called
+from mirotwin.verify.effect import Proof
 
 RESET_TICKS = ms(1)
 """An AT89C52 needs its pin high for two machine cycles, 24 ticks; both LM629 are reset by the firmware."""
@@ -20,13 +22,16 @@ UP_TICKS = ms(267)
 
 
 class DeviceUnderTest:
-    """The device in `slot` of `network`. `written`: whether the test has changed its memory by itself."""
+    """The device in `slot` of `network`. `written`: whether the test has changed its memory by itself; `proofs`: that
+    the faults of the test changed something.
+    """
 
     def __init__(self, world: World, network: int, slot: int) -> None:
         self.world = world
         self.network = network
         self.slot = slot
         self.written = False
+        self.proofs: list[Proof] = []
         self._device: Any = world.device(network, slot)
         self._waits = Waits(world)
 
@@ -73,6 +78,15 @@ class DeviceUnderTest:
         self.world.run_to(self.world.set_reset(1, self.network, self.slot))
         self.world.run_for(for_ticks)
         self.world.run_to(self.world.set_reset(0, self.network, self.slot))
+
+    @shown_where_it_was_called
+    def fault(self, what: str) -> None:
+        """Breaks hardware, or mends it: "encoder left lost", as `fault` of steps. A test in which it changes nothing is
+        not judged, and fails. Raises ValueError for what is no fault.
+        """
+        fault = Fault(self.world.earliest_action_tick, self.network, self.slot, fault_text(what))
+        Proof.begin(self.proofs, self.world, f"fault {what}", fault)
+        self.world.run_to(self.world.do(fault))
 
     def power_off(self) -> None:
         """Switches its supply off: its memory is lost; wheels roll out."""

@@ -46,6 +46,8 @@ class Rig:
         self.serial: SerialUnderTest | None = None
         if isinstance(self.spec.scenario, BoardScenario):
             self.board, self.serial = BoardUnderTest(self.world), SerialUnderTest(self.world)
+        for device in (*self.robots, *filter(None, [self.board])):
+            device.proofs = self.run.proofs
 
     @property
     def tick(self) -> int:

@@ -3,7 +3,8 @@
 It asks for little, so that firmware which is merely different passes: of several frames in a row that ask a wheel to
 turn at another speed than before, one is followed by an STT to that wheel; and a wheel that is asked to turn has its
 motor driven or its encoder counting. It does not go by the robot's serial port, which a dead firmware never starts:
-a frame counts if it is fresh as sent, no bit of it was turned over by the radio, and the robot is supplied.
+a frame counts if it is fresh as sent, no bit of it was turned over by the radio, and the robot is supplied and whole:
+one whose encoder is lost must not drive.
 
 A firmware that begins again and again (a watchdog, a jump to its start) obeys frames in between. It shows in the LM629:
 they are reset a second time after they were told to turn, though nothing reset the processor.
@@ -118,8 +119,8 @@ class AliveMonitor(Monitor[ActsAtAll]):
         self.freshness = Freshness()
         self.board = subject.robot.board
         self.listener = None if radio is None else radio.listeners[subject.slot]
-        self.unjudged: list[tuple[int, int]] = []
-        """Air, and tick of the last reset, at the end of each control period that is not judged, oldest first."""
+        self.unjudged: list[tuple[int, int, bool]] = []
+        """Air, tick of the last reset, whether it is whole, at the end of each period not judged yet, in order."""
         self.counted = self.shown = 0
         self.begun_tick = -1
         self.chip = self.board.left
@@ -137,9 +138,10 @@ class AliveMonitor(Monitor[ActsAtAll]):
 
     def period_over(self) -> None:
         board, listener, air = self.board, self.listener, -1
-        if listener is not None and board.powered and not board.held and listener.link_state == UP:
+        whole = self.subject.robot.is_whole() and (listener is None or not listener.rxd_state)
+        if whole and listener is not None and board.powered and not board.held and listener.link_state == UP:
             air = listener.bit_errors
-        self.unjudged.append((air, self.chip.reset_tick))
+        self.unjudged.append((air, self.chip.reset_tick, whole))
 
     def restarted(self, tick: int) -> None:
         self.begun_tick = tick
@@ -163,10 +165,11 @@ class AliveMonitor(Monitor[ActsAtAll]):
                     self.waiting.append((end_tick, self.before, words))
 
     def period(self, record: RobotPeriod, tick: int) -> None:
-        air, reset_tick = self.unjudged.pop(0)
+        air, reset_tick, whole = self.unjudged.pop(0)
         if reset_tick != self.reset_tick:
-            self.resets.append(reset_tick)
             self.reset_tick = reset_tick
+            if whole:
+                self.resets.append(reset_tick)
         if self.resets or not self.turned:
             self._look_at_resets(record, tick)
         if not self.needed:

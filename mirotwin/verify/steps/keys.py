@@ -21,7 +21,7 @@ from miro_exact.clock import (
     TICKS_PER_SECOND,
 )
 from miro_host.wheels import UNITS_PER_COUNT, Wheels, nearest
-from miro_protocol.actions import Power, RadioState, Reset
+from miro_protocol.actions import Fault, Power, RadioState, Reset, fault_text
 from miro_protocol.frames import ServiceFrame, TeamFrame
 from miro_protocol.table import DOWNLINK, SEQ_MODULUS, Opcode
 from miro_robot.parts.values import checked_put, leaves
@@ -519,6 +519,35 @@ class PowerStep(OfRobot, frozen=True, kw_only=True):
         machine.do(Power(machine.earliest_action_tick, self.network, slot, int(self.power == "on")))
 
 
+class FaultStep(OfRobot, frozen=True, kw_only=True):
+    """`fault`: hardware of a robot breaks, or is mended; of a board only a bit of RAM. It has to change something."""
+
+    VERB = "fault"
+    NEEDS = "switch"
+
+    fault: str
+
+    def problem(self, network: ScenarioNetwork) -> str:
+        return self._misspelt() or super().problem(network)
+
+    def problem_alone(self, scenario: BoardScenario) -> str:
+        if self.fault.split()[:1] == ["flip"]:
+            return self._misspelt()
+        return 'fault: a board has flip ADDR.BIT; put a value of the part, as eyes.echo = "none"'
+
+    def _misspelt(self) -> str:
+        try:
+            fault_text(self.fault)
+        except ValueError as error:
+            return f"fault: {error}"
+        return ""
+
+    def do(self, player: Player) -> None:
+        slot, machine = player.slot(self.slot, self.network), player.machine
+        fault = Fault(machine.earliest_action_tick, self.network, slot, fault_text(self.fault))
+        player.break_hardware(fault, f"{self}")
+
+
 class SaveStep(Step, frozen=True, kw_only=True):
     """`save`: the world's state, as `World.save` gives it, into a file of this name (`NAME.world`)."""
 
@@ -595,7 +624,7 @@ PLAIN: dict[str, type[Step]] = {
     struct.VERB: struct
     for struct in (
         *(StreamStep, PauseStep, CheckStep, RadioStep, ResetStep, PowerStep, SaveStep),
-        *(PutStep, PressStep),
+        *(PutStep, PressStep, FaultStep),
     )
 }
 """Steps whose table is read as it stands."""

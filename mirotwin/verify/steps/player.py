@@ -22,7 +22,7 @@ import msgspec
 from miro_exact.bad_input import BadInput
 from miro_exact.clock import CONTROL_PERIOD_TICKS, NEVER_TICK, TICKS_PER_SECOND
 from miro_host.wheels import Wheels
-from miro_protocol.actions import Put, PutValue
+from miro_protocol.actions import Fault, Put, PutValue
 from miro_robot.image import Image
 from miro_sim.scenario.errors import ScenarioError
 from miro_sim.world.conditions import (
@@ -44,6 +44,7 @@ from miro_sim.world.waits import SEEN_AT_MOST, WaitExpired
 from miro_sim.world.world import World
 from mirotwin.verify.checks.interface import Check, at, in_ms, ms_ticks
 from mirotwin.verify.checks.monitors import Checks
+from mirotwin.verify.effect import Proof
 from mirotwin.verify.frame_sender import FrameSender
 from mirotwin.verify.steps.keys import Step
 
@@ -144,6 +145,7 @@ class Player:
         self.failure: StepFailure | None = None
         self.saved: dict[str, bytes] = {}
         self.checks: list[Checks] = []
+        self.proofs: list[Proof] = []  # of faults
         self.found = ""  # what pins, values and text were in the last wait
         self.pressed: dict[str, int] = {}  # until which tick a button is
         self._watch_pins()
@@ -293,6 +295,11 @@ class Player:
             if network in (None, robot.network) and slot in (None, robot.slot)
         ]
         self.checks.append(Checks(self.world, dict.fromkeys(places, checks)))
+
+    def break_hardware(self, fault: Fault, name: str) -> None:
+        """Breaks hardware as soon as possible; what breaks, and is not mended, has to change something."""
+        Proof.begin(self.proofs, self.world, name, fault)
+        self.machine.do(fault)
 
     # Parts of a board
 

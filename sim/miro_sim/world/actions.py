@@ -158,26 +158,36 @@ class Actions:
             medium.log.note(event)
 
     def _do(self, medium: Medium, action: WaitingAction) -> Action:
-        if action.what == RADIO_UP:
+        done = self._action(action)
+        if isinstance(done, RadioState):
             medium.set_radio(action.value, up=True)
+        elif not isinstance(done, Reseed):
+            device = medium.device(action.slot)
+            if isinstance(done, Put):
+                device.put(done.path, done.value, action.tick)
+            elif isinstance(done, Fault):
+                device.break_hardware(done.what)
+            elif isinstance(done, Reset):
+                device.board.set_reset(action.value)
+            else:
+                device.board.set_power(action.value)
+        return done
+
+    def announced(self) -> list[Action]:
+        """Those that wait."""
+        return [self._action(waiting) for waiting in self.waiting if waiting.what in _EVENTS]
+
+    def _action(self, action: WaitingAction) -> Action:
+        if action.what == RADIO_UP:
             return RadioState(action.tick, self.network, LINK_STATES[action.value])
         if action.what == RESEED_UP:
             return Reseed(action.tick, self.network, int(action.text))
-        device = medium.device(action.slot)
         if action.what == PUT:
-            put = self._put(action)
-            device.put(put.path, put.value, action.tick)
-            return put
+            return self._put(action)
         if action.what == FAULT:
-            fault = Fault(action.tick, self.network, action.slot, action.text.decode())
-            device.break_hardware(fault.what)
-            return fault
-        board = device.board
-        if action.what == RESET:
-            board.set_reset(action.value)
-            return Reset(action.tick, self.network, action.slot, action.value)
-        board.set_power(action.value)
-        return Power(action.tick, self.network, action.slot, action.value)
+            return Fault(action.tick, self.network, action.slot, action.text.decode())
+        kind = Reset if action.what == RESET else Power
+        return kind(action.tick, self.network, action.slot, action.value)
 
     def _put(self, action: WaitingAction) -> Put:
         return put_of(action.tick, self.network, action.slot, action.text.decode())

@@ -103,6 +103,13 @@ class Robot(Device):
             Device.break_hardware(self, what)
         # The network has broken the wire to RXD.
 
+    def is_whole(self) -> bool:
+        """Whether no encoder and no LM629 is broken now."""
+        broken = self.board.left.port.broken or self.board.right.port.broken
+        left, right = self.drive.left_encoder, self.drive.right_encoder
+        held = left.held_a >= 0 or left.held_b >= 0 or right.held_a >= 0 or right.held_b >= 0
+        return not broken and not held
+
     def steer(self, measured: Posture | None, telemetry: LastTelemetry | None, tick: int) -> WheelCommand:
         """Wheel commands from what the PC measured and the robot's last telemetry. Raises PluginError."""
         try:

@@ -438,3 +438,11 @@ def test_a_radio_that_is_down_loses_frames_and_the_failsafe_stops_the_wheels(lin
         link.radio(radio)
         link.drive({0: (300, 300)}, ms(for_ms))
         assert robot.wheels.mode == (mode, mode)
+
+
+@pytest.mark.parametrize(("what", "verdict"), [("flip 2Ah.3", "passed"), ("rxd 1", "not judged")])
+def test_a_fault_that_changes_nothing_leaves_a_test_that_is_not_judged(one, robot, what, verdict):
+    one.world.run_for(ms(20))
+    robot.fault(what)
+    one.world.run_for(ms(50))
+    assert one.judge().verdict == verdict

@@ -73,6 +73,8 @@ WRONG = {
     '{ radio = "off" }': "step 1.radio: 'off' is not one of the choices; use down, noise or up",
     "{ reset = 2 }": "step 1.reset: 2 is not one of the choices; use 0 or 1",
     '{ power = "on", slot = 4 }': "step 1.slot: there is no robot in slot 4; there is 0",
+    '{ fault = "encoder left" }': "step 1.fault: 'encoder left' is no hardware fault; write one of: flip ADDR.BIT",
+    '{ fault = "rxd 0", slot = 4 }': "step 1.slot: there is no robot in slot 4; there is 0",
     '{ save = "../x.world" }': "step 1.save: '../x.world' is not the name of a file here; write letters, digits,",
     '{ save = "a.world" }, { save = "a.world" }': "step 2.save: step 1 saves a.world, too; give each its own name",
     "{ pause_ms = 1, number = 3 }": "step 1.number: unknown key; keys here: note, pause_ms",
