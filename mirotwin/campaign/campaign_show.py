@@ -21,6 +21,7 @@ from mirotwin.campaign.comparison import (
     judged,
     shown,
 )
+from mirotwin.campaign.flips import FLIP, classes, classes_table
 from mirotwin.campaign.rows import SHARES, UNSETTLED, Arm, ResultRows, paired, paired_levels
 from mirotwin.campaign.statistics import Figures, Interval
 from mirotwin.shell.command import Argument, Option, Options, command_of
@@ -91,7 +92,8 @@ def show(options: ShowOptions) -> int:
         return _compare(rows, options.between, metrics or judged(rows), as_json)
     if against is not None:
         return _against(rows, against, metrics or judged(rows), options.tolerance / 100.0, as_json)
-    _show(rows, metrics or shown(rows), options.by or rows.about.factors, as_json)
+    by = [name for name in rows.about.factors if name != FLIP]
+    _show(rows, metrics or shown(rows), options.by or by, as_json)
     return DONE
 
 
@@ -100,7 +102,8 @@ def _show(rows: ResultRows, metrics: Sequence[str], by: Sequence[str], as_json: 
     arms = rows.arms(by, groups, metrics)
     shown = [arm for arm, _ in islice(arms, None if as_json else MOST_GROUPS)]
     if as_json:
-        _print_json({"results": str(rows.path), "runs": rows.count, "groups": shown})
+        flips = {"flips": classes(rows)} if FLIP in rows.about.factors else {}
+        _print_json({"results": str(rows.path), "runs": rows.count, "groups": shown, **flips})
         return
     show_line(f"{rows.path}: {amount(rows.count, 'run')} of {rows.about.campaign}")
     show_table(_groups_table(shown))
@@ -108,6 +111,8 @@ def _show(rows: ResultRows, metrics: Sequence[str], by: Sequence[str], as_json: 
         show_line(
             f"{amount(len(groups) - len(shown), 'more group')}: --by names fewer factors, --json shows all"
         )
+    if FLIP in rows.about.factors:
+        show_table(classes_table(rows))
 
 
 def _groups_table(groups: Sequence[Arm]) -> Table:

@@ -16,6 +16,7 @@ from miro_sim.world.outbox import INJECTED
 from miro_sim.world.world import World
 
 T = TypeVar("T")
+NO_EFFECT = "the fault changed nothing up to the end of the run"
 
 
 class Proof:
@@ -65,7 +66,7 @@ class Proof:
                 twin.inject(sent.data, sent.network, sent.tick, sent.bad_stop)
             if twin.step().digest != period.digest:
                 return ""
-        return f"{self.name}: the fault changed nothing up to the end of the run"
+        return f"{self.name}: {NO_EFFECT}"
 
 
 def _without(known: list[T], items: list[T]) -> list[T]:
