@@ -77,83 +77,61 @@ def branch(spec: RunSpec, tick: int, seed: int) -> RunSpec:
 
 
 def branched(spec: RunSpec, name: str, tick: int, seeds: Sequence[int], jobs: int = 1) -> Point:
-    """What becomes of the branches at `tick`, in `jobs` processes. `name`: of the check that fails."""
+    """What becomes of the branches at `tick`, `jobs` of them at once. `name`: of the check that fails."""
     if not CAN_COPY:
         return Point(tick, tuple(has_failed(Run(branch(spec, tick, seed)).play(), name) for seed in seeds))
-    shares = [seeds[first::jobs] for first in range(min(jobs, len(seeds)))]
-    pipes = [_copied(lambda share=share: _outcomes(spec, name, tick, share)) for share in shares]  # type: ignore[misc]
-    outcomes = [_answer(*pipe) for pipe in pipes]
-    return Point(tick, tuple(bool(outcomes[at % jobs][at // jobs]) for at in range(len(seeds))))
-
-
-def _copied(work: Callable[[], bytes]) -> tuple[int, int]:
-    """A copy of this process that answers with what `work` gives: its number, and where its answer comes."""
-    reads, writes = os.pipe()
-    process = os.fork()
-    if process:
-        os.close(writes)
-        return process, reads
-    code = BROKEN
-    try:
-        os.close(reads)
-        os.write(writes, work())
-        code = PASSED
-    finally:
-        os._exit(
-            code
-        )  # nothing of the first process is done twice: files are flushed, locks are let go there
-
-
-def _answer(process: int, reads: int) -> bytes:
-    """Raises RuntimeError for a process that broke."""
-    with os.fdopen(reads, "rb") as pipe:
-        answer = pipe.read()
-    _code_of(process, PASSED)
-    return answer
-
-
-def _code_of(process: int, *codes: int) -> int:
-    code = os.waitstatus_to_exitcode(os.waitpid(process, 0)[1])
-    if code not in codes:
-        raise RuntimeError(f"a branch ended with exit code {code}")
-    return code
-
-
-def _outcomes(spec: RunSpec, name: str, tick: int, seeds: Sequence[int]) -> bytes:
-    """PASSED or FAILED for each seed. Copies of this process end here, too."""
-    if tick == FROM_START:
-        return bytes(has_failed(Run(replace(spec, seed=seed)).play(), name) for seed in seeds)
-    run, codes, is_branch = Run(spec), bytearray(), False
-    world = run.world
+    codes: list[int] = []
+    own_seed: int | None = None  # of the copy that this process is
 
     def look(period: Period | None) -> None:
-        nonlocal is_branch
-        if is_branch and has_failed(run, name):
+        nonlocal own_seed
+        if own_seed is not None and has_failed(run, name):
             os._exit(FAILED)
-        if is_branch or world.tick < tick:
+        if own_seed is not None or run.world.tick < tick:
             return
-        gc.freeze()  # a collection in a copy would touch all that it shares with this process, and so copy it
-        for seed in seeds:
-            process = os.fork()
-            if not process:
-                is_branch = True
-                for line in world.lines:
-                    world.do(Reseed(world.earliest_action_tick, line.index, seed))
-                return
-            codes.append(_code_of(process, PASSED, FAILED))
-        raise _AllBranched
+        own_seed = _copied(seeds, jobs, codes)
+        if own_seed is None:
+            raise _AllBranched
+        for line in run.world.lines:
+            run.world.do(Reseed(run.world.earliest_action_tick, line.index, own_seed))
 
     try:
-        look(None)
-        world.observers.append(look)
-        failed = has_failed(run.play(), name)
+        if tick == FROM_START:
+            own_seed = _copied(seeds, jobs, codes)
+        if tick != FROM_START or own_seed is not None:
+            run = Run(spec if own_seed is None else replace(spec, seed=own_seed))
+            look(None)
+            run.world.observers.append(look)
+            codes = [FAILED if has_failed(run.play(), name) else PASSED] * len(seeds)  # over before that tick
     except _AllBranched:
-        return bytes(codes)
+        pass
     except BaseException:
-        os._exit(BROKEN)  # with its parent's trace, if it is a branch, there would be one for each
-    if is_branch:
-        os._exit(FAILED if failed else PASSED)
-    return bytes([failed] * len(seeds))  # it was over before that tick
+        if own_seed is not None:
+            os._exit(BROKEN)
+        raise
+    if own_seed is not None:
+        os._exit(codes[0])  # what this process holds open is the first one's to end
+    return Point(tick, tuple(code == FAILED for code in codes))
+
+
+def _copied(seeds: Sequence[int], jobs: int, codes: list[int]) -> int | None:
+    """Copies this process once for each seed, `jobs` of them at a time: returns the seed in a copy, and None in this
+    process, with the exit codes of all. Raises RuntimeError for a copy that broke.
+    """
+    gc.freeze()  # a collection in a copy would touch, and so copy, all that it shares with this process
+    running: list[int] = []
+    for place in range(len(seeds) + jobs):
+        if place >= jobs and running:
+            codes.append(os.waitstatus_to_exitcode(os.waitpid(running.pop(0), 0)[1]))
+            if codes[-1] not in (PASSED, FAILED):
+                raise RuntimeError(f"a branch ended with exit code {codes[-1]}")
+        if place < len(seeds):
+            process = os.fork()
+            if not process:
+                return seeds[place]
+            running.append(process)
+    gc.unfreeze()
+    return None
 
 
 def search(

@@ -12,7 +12,6 @@ from rich.table import Table
 from miro_exact.bad_input import BadInput, encodable
 from miro_exact.domain import MAX_SEED
 from miro_sim.scenario.board_scenario import load_any
-from miro_sim.scenario.keys import Scenario
 from mirotwin.campaign.branches import (
     FROM_START,
     STEP,
@@ -23,7 +22,7 @@ from mirotwin.campaign.branches import (
     has_failed,
     search,
 )
-from mirotwin.campaign.why_page import Curve, cells, drawing, page
+from mirotwin.campaign.why_page import COLUMNS, Curve, cells, page
 from mirotwin.runs.failure_place import place_at
 from mirotwin.runs.job import load_job
 from mirotwin.runs.run import Run
@@ -48,7 +47,7 @@ from mirotwin.verify.steps.reading import steps_in
 COARSE = 8
 """Pieces of the run up to the failure, between which the search begins."""
 MOST_POINTS = COARSE + 24
-PAGE, PICTURE, FAILS, PASSES = "why.html", "why.svg", "fails.stream", "passes.stream"
+PAGE, FAILS, PASSES = "why.html", "fails.stream", "passes.stream"
 
 
 class WhyOptions(CaseOptions, frozen=True, kw_only=True):
@@ -89,7 +88,7 @@ def why(options: WhyOptions) -> int:
     folder = OutputFolder(
         options.out or Path("runs") / f"{stem_of(options.file) or 'run'}-{spec.seed}-why",
         options.force,
-        (PAGE, PICTURE, FAILS, PASSES),
+        (PAGE, FAILS, PASSES),
         ours=options.out is None,
     )
     period = run.world.period_ticks
@@ -120,9 +119,7 @@ def why(options: WhyOptions) -> int:
         lines = _lines(
             options, curve, spec, [folder.path / stream for stream in two], f"{place}" if place else ""
         )
-        picture = drawing(curve)
-        picture.write(folder.part(PICTURE))
-        folder.part(PAGE).write_bytes(page(curve, picture, lines))
+        folder.part(PAGE).write_bytes(page(curve, lines))
     if not options.quiet:
         show(_table(curve))
     for line in (*curve.lines(), *lines, f"{folder.path / PAGE} has the curve"):
@@ -145,7 +142,8 @@ def _spec(options: WhyOptions) -> RunSpec:
     job = load_job(file, options.firmware, settings, options.seed)
     tell_notes(job.notes)
     spec = replace(job.spec, until_tick=job.case.end_tick or None, origin=file)
-    if not job.recorded or not _steers(spec):
+    networks = getattr(spec.scenario, "networks", ())
+    if not job.recorded or all(network.host != "controller" for network in networks):
         return spec
     # what a controller sends depends on the noise, too: it computes again, and has to come to what was recorded
     spec = replace(spec, computed=True)
@@ -155,12 +153,6 @@ def _spec(options: WhyOptions) -> RunSpec:
             reason = "something was sent in it that its scenario does not say, so that no branch can be made"
             raise BadInput(file, "", reason, "give a scenario with its --seed")
     return spec
-
-
-def _steers(spec: RunSpec) -> bool:
-    """Whether a controller sends."""
-    scenario = spec.scenario
-    return isinstance(scenario, Scenario) and any(one.host == "controller" for one in scenario.networks)
 
 
 def _failed(run: Run, options: WhyOptions) -> tuple[str, int]:
@@ -196,21 +188,15 @@ def _two_branches(spec: RunSpec, name: str, curve: Curve, seeds: list[int]) -> d
 
 def _lines(options: WhyOptions, curve: Curve, spec: RunSpec, streams: list[Path], place: str) -> list[str]:
     """The commands that play the branches again, and that stand at the jump."""
-    own_files = tuple(in_files(options.expected).values())
-    lines = [replay_line(path, foreign_path(spec.image), own_files, options.plugins) for path in streams]
-    debugged = DebugLineOptions(
-        file=options.file,
-        seed=options.seed,
-        settings=options.settings,
-        firmware=options.firmware,
-        at=f"{curve.jump_tick}t",
-        plugins=options.plugins,
-    )
-    return [*lines, f"{debugged.command_line()}{f'  # {place}' if place else ''}"]
+    checks, image = tuple(in_files(options.expected).values()), foreign_path(spec.image)
+    lines = [replay_line(path, image, checks, options.plugins) for path in streams]
+    same = {name: getattr(options, name) for name in ("file", "seed", "settings", "firmware", "plugins")}
+    line = DebugLineOptions(**same, at=f"{curve.jump_tick}t").command_line()
+    return [*lines, f"{line}  # {place}" if place else line]
 
 
 def _table(curve: Curve) -> Table:
-    table = plain_table(right=("at", "fail", "of", "share", "95 % interval"))
+    table = plain_table(right=COLUMNS)
     for row in cells(curve):
         table.add_row(*row)
     return table

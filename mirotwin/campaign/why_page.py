@@ -14,6 +14,7 @@ from mirotwin.report.svg import Drawing, Panel, PanelBox
 WIDTH, HEIGHT = 760, 380
 BOX = PanelBox(66, 76, 670, 250)
 OTHERS = "other robots"
+COLUMNS = ("at", "fail", "of", "share", "95 % interval")
 
 
 class Curve(msgspec.Struct, frozen=True, kw_only=True):
@@ -83,26 +84,26 @@ def drawing(curve: Curve) -> Drawing:
     panel.line(times, [point.share for point in curve.points], colour=1)
     jump = (curve.jump_tick + (curve.period if curve.low >= 0 else 0)) / curve.clock
     panel.line([jump, jump], [0.0, 1.0], colour=2, style="dotted")
-    made = Drawing(WIDTH, HEIGHT, (curve.run, curve.what))
+    made = Drawing(WIDTH, HEIGHT, (curve.run, curve.what.partition(":")[0]))
     made.add(panel, BOX)
     return made
 
 
-def page(curve: Curve, picture: Drawing, commands: Sequence[str]) -> bytes:
+def page(curve: Curve, commands: Sequence[str]) -> bytes:
     """The page; the same curve gives the same bytes."""
     rows = "".join(
         f"<tr>{''.join(f'<td>{escape(cell)}</td>' for cell in row)}</tr>\n" for row in cells(curve)
     )
     found = "".join(f"<p>{escape(line)}</p>\n" for line in curve.lines())
     style = (ASSETS / "page.css").read_text(encoding="utf-8")
-    head = "".join(f"<th>{name}</th>" for name in ("at", "fail", "of", "share", "95 % interval"))
+    head = "".join(f"<th>{name}</th>" for name in COLUMNS)
     return f"""<!doctype html>
 <html lang="en"><head><meta charset="utf-8"><meta name="viewport" content="width=device-width">
 <meta http-equiv="Content-Security-Policy" content="default-src 'none'; style-src 'unsafe-inline'">
 <title>{escape(curve.run)}: when did it become inevitable?</title>
 <style>{style}</style></head><body><main class="wide">
 <h1>When did it become inevitable? {escape(curve.run)}</h1>
-{found}<figure>{picture.text()}</figure>
+{found}<figure>{drawing(curve).text()}</figure>
 <table><thead><tr>{head}</tr></thead><tbody>
 {rows}</tbody></table>
 <pre>{escape(chr(10).join(commands))}</pre>
