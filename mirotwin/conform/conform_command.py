@@ -18,16 +18,30 @@ from mirotwin.conform.rules import ALL as EVERY_RULE
 from mirotwin.conform.rules import LONG, RULES, find, spans
 from mirotwin.conform.run import Outcome, case_names, failure_text, try_all, with_faults
 from mirotwin.desk.guard import DeskOptions
+from mirotwin.runs.sanitized import judged, line_of, read_allowed, sanitized, stale_line
 from mirotwin.shell.command import Argument, Option, Options, command_of
 from mirotwin.shell.console import plain_table, show
 from mirotwin.shell.firmware_image import load_firmware
 from mirotwin.shell.json_text import json_bytes
-from mirotwin.shell.options import ALL, ARTIFACTS, JSON, JUNIT, NAME, PATH, QUIET, SEED, Engine, StackFrom
+from mirotwin.shell.options import (
+    ALL,
+    ALLOW,
+    ARTIFACTS,
+    JSON,
+    JUNIT,
+    NAME,
+    PATH,
+    QUIET,
+    SANITIZE,
+    SEED,
+    Engine,
+    StackFrom,
+)
 from mirotwin.shell.outputs import check_file
 from mirotwin.shell.program import complain, show_line
 from mirotwin.shell.progress import ProgressBar
 from mirotwin.shell.results import Results
-from mirotwin.shell.verdicts import DONE, VERDICTS, exit_code
+from mirotwin.shell.verdicts import DONE, exit_code
 from mirotwin.verify.cases.artifacts import (
     FIRMWARE,
     case_lines,
@@ -86,6 +100,8 @@ class ConformOptions(Options, frozen=True, kw_only=True):
     seed: Annotated[int, SEED.saying("Seed of the noise between keyed frames.")] = 0
     stack_from: StackFrom = None
     engine: Engine = None
+    sanitize: Annotated[bool, SANITIZE] = False
+    allow: Annotated[str | None, ALLOW.saying(ALLOW.help, needs="sanitize")] = None
     desk: DeskOptions = DeskOptions()
     quiet: Annotated[bool, QUIET.saying("No progress bar, and of the table the rules that failed.")] = False
 
@@ -148,7 +164,7 @@ def conform(options: ConformOptions) -> int:
     With --baseline a rule that is in FILE may fail. One that passes again is reported; --write-baseline takes it out.
 
     Exit code 1: a rule failed, or one of --rule was not judged; 3: the firmware did what it must not (bus, stack, ..)
-    in one of the trials; 5: no rule was judged.
+    in one of the trials; 5: no rule was judged. With --sanitize 3 and 1, too, for what `fw sanitize` finds in them.
     """
     if options.listing and (given := options.given(*_OF_TRIALS)):
         raise click.UsageError(f"{given[0]} does not go with --list.")
@@ -183,11 +199,14 @@ def conform(options: ConformOptions) -> int:
             _make_room(artifacts, rules)
         name, sha256 = firmware.path.name, firmware.sha256
         properties = {"firmware": name, "firmware_sha256": sha256, "seed": options.seed}
-        tried = try_all(rules, firmware, options.seed, artifacts is not None, True, options.everything)
+        tried = try_all(
+            rules, firmware, options.seed, artifacts is not None, not options.sanitize, options.everything
+        )
     outcomes: list[Outcome] = []
     lost: BadInput | None = None
     unwritten = ""
-    with ProgressBar("trying rules", len(rules), quiet) as bar:
+    allowed = read_allowed(options.allow)
+    with ProgressBar("trying rules", len(rules), quiet) as bar, sanitized(options.sanitize) as watching:
         try:
             for outcome in tried:
                 outcomes.append(outcome)
@@ -196,6 +215,7 @@ def conform(options: ConformOptions) -> int:
                     unwritten = _keep(outcome, artifacts, firmware)
         except BadInput as error:  # a robot that was lost: outcomes before that are reported
             lost = error
+    findings, stale = judged(watching.take(), allowed)
     if lost is not None and not outcomes:
         raise lost
     outcomes = with_faults(outcomes, rules)
@@ -221,10 +241,13 @@ def conform(options: ConformOptions) -> int:
     if unwritten:
         complain(unwritten)
     _report_faults(outcomes)
+    complain(*watching.unseen, *(stale_line(options.allow, one) for one in stale))
+    lines = [line_of(one) for one in findings]
+    complain(*(text for _, text in lines))
     results.write_junit(junit)  # reported first: the file may fail
     if lost is not None:
         raise lost
-    return VERDICTS[verdict].code
+    return exit_code(verdict, *(one for one, _ in lines))
 
 
 def _keep(outcome: Outcome, artifacts: Path, firmware: Image) -> str:

@@ -9,6 +9,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import contextmanager, nullcontext
+from contextvars import ContextVar
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, BinaryIO
 
@@ -48,6 +49,9 @@ if TYPE_CHECKING:
 ANSWER_LOOK_TICKS = 24_000
 """Between two looks at whether a board has sent its answer."""
 
+on_world: ContextVar[Callable[[World], object] | None] = ContextVar("on_world", default=None)
+"""Called with the world of each run that begins: how the sanitizer comes to the runs of a command."""
+
 
 class Run:
     """`world`: one of the spec that nobody has moved, or that was moved to where the checks are to begin.
@@ -60,6 +64,8 @@ class Run:
     def __init__(self, spec: RunSpec, world: World | None = None, trace: Trace | None = None) -> None:
         self.spec = spec
         self.world = spec.world() if world is None else world
+        if (begun := on_world.get()) is not None:
+            begun(self.world)
         self.trace = trace
         self.checks = Checks(self.world, spec.checks(), spec.cut)
         self.player: Player | None = player_of(self.world, spec.steps, spec.origin)

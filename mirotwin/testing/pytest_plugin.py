@@ -48,6 +48,10 @@ def pytest_configure(config: pytest.Config) -> None:
         "mirotwin(scenario=, board=, settings=, firmware=, seed=, expect=, boot=): the world of the test (mirotwin)",
     )
     check_options(config)
+    if config.getoption("--mirotwin-sanitize") and not config.getoption("--collect-only"):
+        from mirotwin.testing.session_sanitizer import SanitizedSession
+
+        config.pluginmanager.register(SanitizedSession(config), "mirotwin-sanitizer")
     if config.getoption("--firmware-coverage") and not config.getoption("--collect-only"):
         from mirotwin.testing.session_coverage import FirmwareCoverage
 

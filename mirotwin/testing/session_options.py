@@ -26,6 +26,12 @@ _OPTIONS: tuple[tuple[str, str, type, str], ...] = (
     ("--mirotwin-law", "FILE.py:CLASS", list, "a law of your own that scenarios name"),
     ("--mirotwin-estimator", "FILE.py:CLASS", list, "an estimator of your own that scenarios name"),
     ("--mirotwin-pages", "", bool, "make the page of each failed test, too: some seconds each"),
+    (
+        "--mirotwin-sanitize",
+        "",
+        bool,
+        "fail the session for what firmware does without noticing, such as races",
+    ),
     ("--mirotwin-port", "URL", str, "run against the robots at this port, not against their twin"),
     ("--mirotwin-allow-motion", "", bool, "with a port: send what moves a robot"),
     ("--mirotwin-max-speed", "M_S", float, "with a port: refuse faster wheels (default: 0.5)"),

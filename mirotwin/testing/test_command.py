@@ -10,6 +10,7 @@ from pathlib import Path
 
 from miro_exact.bad_input import BadInput, amount
 from mirotwin.runs.result import Result
+from mirotwin.runs.sanitized import Allowed, read_allowed, stale_line
 from mirotwin.runs.test_file import KINDS, collect, stem_of
 from mirotwin.shell.command import command_of
 from mirotwin.shell.junit import TestCase
@@ -17,7 +18,7 @@ from mirotwin.shell.outputs import check_file
 from mirotwin.shell.program import complain, show_line, show_traceback, tell_notes
 from mirotwin.shell.results import Results
 from mirotwin.shell.verdicts import VERDICTS, judge
-from mirotwin.testing.test_files import run_file
+from mirotwin.testing.test_files import run_file, run_sanitized
 from mirotwin.testing.test_options import TestOptions
 from mirotwin.verify.cases.artifacts import report_line
 from mirotwin.verify.cases.case import SUFFIX as CASE_SUFFIX
@@ -40,6 +41,8 @@ def test(options: TestOptions) -> int:
     Exit code 1: a step or a check failed, or a check that is named had no occasion; 3: the firmware did what it must
     not; 2: a file cannot be run, or there is none. Where several apply: 2, then 3, then 1. 5: nothing was judged,
     because a port, or an image without symbols, shows none of it.
+
+    With --sanitize what the firmware does without noticing fails a file, too: 3 for what happened, 1 for what may.
     """
     word, junit, desk = options.word, options.junit, options.desk
     options.plugins.bring()
@@ -68,13 +71,20 @@ def test(options: TestOptions) -> int:
         from mirotwin.report.report_command import leave_page  # loads the pages' library
 
         require_bokeh()
+    allowed, applied = read_allowed(options.allow), set[Allowed]()
     left_out: dict[str, None] = {}
     results: list[Result] = []
     cases: list[TestCase] = []
     as_settings(options.expected)  # cases may name the checks of files, which are known from now on
     for file in chosen:
         began_s = time.perf_counter()
-        result = run_file(options, file)
+        if options.sanitize:
+            result, used, unseen = run_sanitized(options, file, allowed)
+            applied.update(used)
+            tell_notes(note for note in unseen if note not in left_out)
+            left_out |= dict.fromkeys(unseen)
+        else:
+            result = run_file(options, file)
         if result.error is not None:
             show_traceback(result.error)
         cases.append(_test_case(result, time.perf_counter() - began_s))
@@ -93,6 +103,7 @@ def test(options: TestOptions) -> int:
         reported.print_json()
     else:
         show_line(_summary(results))
+    complain(*(stale_line(options.allow, one) for one in allowed if one not in applied))
     reported.write_junit(junit)  # the verdicts are printed first, whatever becomes of their file
     if all(file.endswith(CASE_SUFFIX) for file in chosen):
         _refuse_unused(in_files(options.expected).values(), results)

@@ -17,12 +17,30 @@ from miro_robot.image import SPACE_BYTES
 from mirotwin.runs.failure_place import located_in
 from mirotwin.runs.job import load_stream
 from mirotwin.runs.result import Line, Result
+from mirotwin.runs.sanitized import Allowed, judged, line_of, sanitized
 from mirotwin.runs.test_file import cannot_be_run, run_test
 from mirotwin.shell.firmware_image import load_firmware
+from mirotwin.shell.verdicts import judge
 from mirotwin.testing.test_options import TestOptions
 from mirotwin.verify.cases.case import SUFFIX as CASE_SUFFIX
 from mirotwin.verify.cases.replay_line import debug_line, replay_line
 from mirotwin.verify.expectations import as_settings, in_files
+
+
+def run_sanitized(
+    options: TestOptions, file: str, allowed: Sequence[Allowed]
+) -> tuple[Result, list[Allowed], list[str]]:
+    """The result with what the sanitizer found, what is allowed and was found, and what it cannot observe."""
+    with sanitized() as watching:
+        result = run_file(options, file)
+        found, stale = judged(watching.take(), allowed)
+    lines: list[Line] = []
+    for finding in found:
+        verdict, text = line_of(finding)
+        lines += [(verdict, text), (verdict, f"    {options.debug_line_for(file, f'{finding.tick}t')}")]
+    used = [one for one in allowed if one not in stale]
+    verdict = judge((result.verdict, *(verdict for verdict, _ in lines)))
+    return replace(result, verdict=verdict, said=[*result.said, *lines]), used, [*watching.unseen]
 
 
 def run_file(options: TestOptions, file: str) -> Result:

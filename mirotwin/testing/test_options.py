@@ -7,7 +7,19 @@ from typing import Annotated
 
 from mirotwin.desk.guard import DeskOptions
 from mirotwin.shell.command import Argument, Option, Options
-from mirotwin.shell.options import ARTIFACTS, JSON, JUNIT, NAME, QUIET, SET, Engine, Firmware, Seed
+from mirotwin.shell.options import (
+    ALLOW,
+    ARTIFACTS,
+    JSON,
+    JUNIT,
+    NAME,
+    QUIET,
+    SANITIZE,
+    SET,
+    Engine,
+    Firmware,
+    Seed,
+)
 from mirotwin.shell.plugin_files import PluginFiles
 from mirotwin.verify.cases.replay_line import DebugLineOptions
 from mirotwin.verify.expectations import Expected
@@ -37,11 +49,13 @@ class TestOptions(Options, frozen=True, kw_only=True):
     pages: Annotated[
         bool, Option(help="Make the page of each failure, as `report` does.", needs="artifacts")
     ] = False
+    sanitize: Annotated[bool, SANITIZE] = False
+    allow: Annotated[str | None, ALLOW.saying(ALLOW.help, needs="sanitize")] = None
     desk: DeskOptions = DeskOptions()
     quiet: Annotated[bool, QUIET.saying("No line for a file that passed.")] = False
 
-    def debug_line_for(self, file: str) -> str:
-        """The command that stands at the failed step of this scenario; "" where it cannot."""
+    def debug_line_for(self, file: str, at: str = "") -> str:
+        """The command that stands at the failed step of this scenario, or at a tick; "" where it cannot."""
         if self.desk.port or self.expected or not file.endswith(".toml"):
             return ""
         return DebugLineOptions(
@@ -50,6 +64,7 @@ class TestOptions(Options, frozen=True, kw_only=True):
             plugins=self.plugins,
             seed=self.seed or None,
             settings=self.settings,
+            at=at,
         ).command_line()
 
     def line_for(self, file: str, saves: bool = False) -> str:
@@ -62,6 +77,8 @@ class TestOptions(Options, frozen=True, kw_only=True):
             firmware=self.firmware,
             plugins=self.plugins,
             artifacts=self.artifacts if saves else None,
+            sanitize=self.sanitize,
+            allow=self.allow,
             desk=self.desk,
         )
         return again.command_line()
