@@ -6,11 +6,14 @@ import re
 import pytest
 from msgspec.structs import replace
 
+from miro_protocol.actions import Reseed
 from miro_sim.scenario.file import load
 from mirotwin.campaign import branches
 from mirotwin.campaign.branches import FROM_START, Point, branch, branched, has_failed, search
+from mirotwin.recording.reader import read
 from mirotwin.runs.run import Run
 from mirotwin.runs.spec import RunSpec
+from mirotwin.shell.outputs import OutputFolder
 from mirotwin.verify.checks.expect import expectations_in
 from tests.mirotwin.campaign.race import PLACE, racing
 from tests.mirotwin.program import mirotwin
@@ -19,6 +22,12 @@ from tests.sim.world.rig import PERIOD, image
 LOSSY = ("network.radio.bit_error_rate=5e-3", "duration_s=0.2")
 FEW_FRAMES = "frames_accepted_min=2"
 SEEDS = range(50, 58)
+
+
+@pytest.fixture
+def here(tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    return tmp_path
 
 
 def lossy(expect=FEW_FRAMES, seed=2):
@@ -54,6 +63,14 @@ def test_a_branch_that_breaks_is_an_error_and_no_verdict(monkeypatch):
         branched(lossy(), "frames_accepted_min", PERIOD, SEEDS[:2])
 
 
+def test_the_recording_of_a_branch_replays_to_the_same_bits(here):
+    run = Run(branch(lossy(), 2 * PERIOD, 99)).play()
+    run.write(OutputFolder(here / "run"))
+    actions = [action for period in read(here / "run" / "run.mcap").periods for action in period.actions]
+    assert actions == [Reseed(2 * PERIOD + 120, 0, 99)]
+    assert "equals the recorded one" in mirotwin.succeeds("replay", "run", "-q")
+
+
 def stepping(at, below=0.1):
     """Branches of a run that is decided in control period `at`; the list gets what was looked at."""
     looked = []
@@ -85,12 +102,6 @@ def test_a_run_that_is_lost_from_the_start_has_no_jump():
 WHY = ("why", "fig6", "--seed", 2, "--expect", FEW_FRAMES, "--branches", 8, "-q")
 WHY += tuple(itertools.chain.from_iterable(("--set", one) for one in LOSSY))
 FILES = ("fails.stream", "passes.stream", "why.html")
-
-
-@pytest.fixture
-def here(tmp_path, monkeypatch):
-    monkeypatch.chdir(tmp_path)
-    return tmp_path
 
 
 def test_the_two_branches_replay_to_their_verdicts(here):
