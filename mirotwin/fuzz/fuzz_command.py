@@ -84,7 +84,7 @@ BARE = "Any 8051 firmware with a serial port"
 BOARD = "A board with parts"
 _FOR_ANY = ("protocol", "baud", "boot_ms")
 """Options of either of these."""
-_NOT_FOR_BOARDS = ("robots", "slot", "bare", "crystal", "expect_all")
+_NOT_FOR_BOARDS = ("robots", "slot", "bare", "crystal", "expect_all", "faults")
 
 
 class FuzzOptions(Options, frozen=True, kw_only=True):
@@ -120,6 +120,12 @@ class FuzzOptions(Options, frozen=True, kw_only=True):
             f" sleeps; {1000 * AWAKE_TICKS // TICKS_PER_SECOND}ms if it never does.",
         ),
     ] = None
+    faults: Annotated[
+        bool,
+        Option(
+            help="Hardware of the robot breaks, too: bits of RAM turn over, LM629s hang, the supply dips."
+        ),
+    ] = False
     expected: Annotated[
         tuple[str, ...],
         EXPECT.saying(
@@ -306,6 +312,7 @@ def _common(options: FuzzOptions, hertz: int) -> TargetSpec:
         baud=options.baud or 0,
         after_ticks=None if options.after is None else options.after.ticks(hertz),
         engine=cast(Literal["compiled", "python"], engines.active()),
+        faults=options.faults,
     )
 
 

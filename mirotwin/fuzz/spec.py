@@ -27,7 +27,8 @@ class TargetSpec(msgspec.Struct, frozen=True, forbid_unknown_fields=True, omit_d
     `robots` and `slot` are the MIRO's. `protocol`: name of the wire format of frames, "" for the board's own;
     `expected`: checks as --expect takes them, which judge each execution beside the board's own; `baud`: rate of the
     CPU's UART, 0 for what its maker takes; `after_ticks`: how long a run goes on after its last character, None for the
-    harness's own. `parameters`: all else that a maker takes. `engine`: "compiled" or "python", "" for the one that is
+    harness's own. `parameters`: all else that a maker takes;
+    `faults`: the MIRO's hardware breaks, too. `engine`: "compiled" or "python", "" for the one that is
     installed.
     `maker`: "module:function" in the place of the board's own maker.
     """
@@ -42,6 +43,7 @@ class TargetSpec(msgspec.Struct, frozen=True, forbid_unknown_fields=True, omit_d
     baud: Whole = 0
     after_ticks: Whole | None = None
     parameters: dict[str, Any] = {}
+    faults: bool = False
     engine: Literal["", "compiled", "python"] = ""
     maker: str = ""
 

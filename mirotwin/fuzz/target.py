@@ -10,10 +10,11 @@ import msgspec
 
 from miro_exact.bad_input import BadInput
 from miro_exact.clock import CONTROL_PERIOD_TICKS
-from miro_protocol.actions import Action, Put, Reset, ScriptItem
+from miro_protocol.actions import Action, Fault, Put, Reset, ScriptItem
 from miro_protocol.table import downlink
 from miro_protocol.transmission import DOWN, Transmission
 from miro_robot.board import Board
+from miro_robot.broken import break_board
 from miro_robot.harness.fast_oracle import NAMES, FastOracle
 from miro_robot.harness.harness import AHEAD_TICKS, AWAKE, LEAD_TICKS, Harness
 from miro_robot.harness.program import INPUTS, RESET_TICKS, Program
@@ -134,8 +135,8 @@ class Target(ABC):
             self.put_at(begin_tick + ticks, which, value) for at, ticks, which, value in puts if at == place
         ]
 
-    def put_at(self, tick: int, which: int, value: int) -> Put:
-        """A put of the program as an action; of a target whose programs have any."""
+    def put_at(self, tick: int, which: int, value: int) -> Put | Fault:
+        """A put of the program as an action, of a robot a hardware fault; of a target whose programs have any."""
         raise NotImplementedError
 
     def note(self) -> str:
@@ -160,7 +161,36 @@ def described(item: ScriptItem) -> str:
         return f"{item.tick}: reset {item.level}"
     if isinstance(item, Put):
         return f"{item.tick}: {item.text}"
+    if isinstance(item, Fault):
+        return f"{item.tick}: {item.what}"
     return str(item)
+
+
+FAULT_WAYS = ("flip", "lm629 left", "lm629 right", "power")
+OF_BROKEN = ("no_fault", "moves_only_when_fresh", "motors_off_ms", "answers_only_in_turn")
+"""What a robot whose hardware breaks has to keep; it need not act."""
+_LM629_WAYS = ("busy", "dead", "ok")
+
+
+def fault_of(which: int, value: int) -> str:
+    """The fault that a put of a program means."""
+    way = FAULT_WAYS[which]
+    if way == "flip":
+        return f"flip {value >> 3 & 0xFF:02X}h.{value & 7}"
+    return "power dip" if way == "power" else f"{way} {_LM629_WAYS[value % 3]}"
+
+
+class Breaker:
+    """Breaks the hardware of `board` where a program puts something."""
+
+    def __init__(self, board: Board, oracle: FastOracle) -> None:
+        self.board, self.oracle = board, oracle
+
+    def put(self, which: int, value: int, tick: int) -> None:
+        what = fault_of(which, value)
+        break_board(self.board, what)
+        if what == "power dip":
+            self.oracle.restarted(tick)
 
 
 class RobotTarget(Target):
@@ -177,6 +207,7 @@ class RobotTarget(Target):
         robots: int = 3,
         slot: int = 0,
         after_ticks: int | None = None,
+        faults: bool = False,
     ) -> None:
         if input not in INPUTS:
             raise BadInput("", "", f"input {input!r}", f"use {', '.join(INPUTS)}")
@@ -185,8 +216,10 @@ class RobotTarget(Target):
         self.oracle = FastOracle(self.board, slot, robots)
         cpu, bit_ticks = self.board.cpu, downlink(robots).bit_ticks
         after = -1 if after_ticks is None else after_ticks
-        harness = Harness(self.board, cpu, self.oracle, bit_ticks, self.board, after)
-        super().__init__(image, harness, Program(INPUTS.index(input), slot, robots), slot)
+        breaker = Breaker(self.board, self.oracle) if faults else None
+        harness = Harness(self.board, cpu, self.oracle, bit_ticks, self.board, after, breaker)
+        program = Program(INPUTS.index(input), slot, robots, choices=len(FAULT_WAYS) if faults else 0)
+        super().__init__(image, harness, program, slot)
         self.code = 0
 
     @property
@@ -196,6 +229,9 @@ class RobotTarget(Target):
     def run(self, data: Any) -> int:
         ended = self.play(data)
         self.code = self.oracle.code
+        if self.program.puts and NAMES[self.code] not in OF_BROKEN:
+            self.code = 0
+            return 0
         if ended == AWAKE and not self.code:
             self.code = NEVER_SLEEPS_CODE
         return self.code
@@ -215,6 +251,9 @@ class RobotTarget(Target):
     def seeds(self) -> list[bytes]:
         return seeds(self.input, self.robots, self.slot)
 
+    def put_at(self, tick: int, which: int, value: int) -> Fault:
+        return Fault(tick, 0, self.slot, fault_of(which, value))
+
     def inputs_of(self, happened: Iterable[ScriptItem]) -> list[bytes]:
         return inputs_of(self.input, happened, self.robots)
 
@@ -225,7 +264,7 @@ class RobotTarget(Target):
 def robot_target(spec: TargetSpec) -> RobotTarget:
     """The target of a specification. Raises BadInput."""
     image = load_firmware(spec.image, named=False)
-    return RobotTarget(image, spec.input, spec.robots, spec.slot, spec.after_ticks)
+    return RobotTarget(image, spec.input, spec.robots, spec.slot, spec.after_ticks, spec.faults)
 
 
 def _booted(image: Image, slot: int, robots: int) -> Board:

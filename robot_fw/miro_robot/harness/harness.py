@@ -128,7 +128,7 @@ class Harness:
     `bit_ticks`: of the line. The machine is where it shall begin, with nothing on RXD. `sleeps`: whether its firmware
     does when it has nothing to do. `after_ticks`: how long a run goes on after its last character at least, -1 for
     what its firmware needs. `device`: who runs a machine that is no `Cpu` alone. It has `run(tick)`, which returns
-    whether it stopped, `put(which, value, tick)` and `set_reset(level)`.
+    whether it stopped, `put(which, value, tick)` and `set_reset(level)`; of a board only `put` is used.
     """
 
     NOT_STATE = ("*",)
@@ -304,7 +304,7 @@ class Harness:
         return 1 if stopped or self.oracle.code else 0
 
     def _move(self, until: int) -> int:
-        if self.device is not None:
+        if self.device is not None and self.board is None:
             return self._go_on(until)
         self.cpu.begin_run()
         stopped = self._go_on(until)
@@ -343,7 +343,7 @@ class Harness:
         cpu = self.cpu
         stopped = 0
         asleep = 0
-        if self.device is None:
+        if self.device is None or self.board is not None:
             cpu.begin_run()
         while self.now_tick < until and not stopped and not asleep:
             stopped = self._go_on(self.now_tick + _LOOK)
@@ -351,6 +351,6 @@ class Harness:
             self.oracle.look(self.now_tick)
             stopped = stopped or self.oracle.code
             asleep = cpu.idle or cpu.powered_down
-        if self.device is None:
+        if self.device is None or self.board is not None:
             cpu.end_run()
         return asleep != 0 and not stopped

@@ -7,6 +7,7 @@ from typing import Any
 
 from miro_exact.clock import CYCLE_TICKS
 from miro_protocol.actions import PutValue, fault_text
+from miro_robot.broken import flip_bit
 from miro_robot.event_log import TRUE
 from miro_robot.image import Image
 from miro_robot.processor_board import ProcessorBoard
@@ -113,9 +114,7 @@ class Device:
 
     def break_hardware(self, what: str) -> None:
         """Does the fault, between two instructions: a bit of RAM turns over."""
-        address, bit = what.split()[1].split("h.")
-        cpu = self.board.cpu
-        cpu.poke_iram(int(address, 16), cpu.peek_iram(int(address, 16)) ^ 1 << int(bit))
+        flip_bit(self.board.cpu, what.split()[1])
 
     # Pins
 

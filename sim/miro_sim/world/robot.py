@@ -10,7 +10,7 @@ from typing import Any
 
 from msgspec.structs import astuple
 
-from miro_exact.clock import CYCLE_TICKS, NEVER_TICK, seconds
+from miro_exact.clock import NEVER_TICK, seconds
 from miro_exact.plugins import PluginError
 from miro_exact.rng import Stream
 from miro_host.pilot import Pilot, WheelCommand
@@ -18,9 +18,9 @@ from miro_host.posture import Posture
 from miro_host.telemetry_receiver import LastTelemetry
 from miro_protocol.actions import fault_text
 from miro_robot.board import Board
+from miro_robot.broken import break_board
 from miro_robot.image import Image
 from miro_robot.lm629.chip import Lm629
-from miro_robot.lm629.host_port import DEAD, STUCK, WHOLE
 from miro_robot.lm629.options import Lm629Options
 from miro_robot.plant import Plant
 from miro_robot.processor_board import ProcessorBoard
@@ -33,7 +33,6 @@ from miro_sim.world.device import Device
 
 ENCODERS = {"lost": (1, 1), "a0": (0, -1), "a1": (1, -1), "b0": (-1, 0), "b1": (-1, 1), "ok": (-1, -1)}
 """Levels at which A and B are held, -1: not at all. Lost: both wires are open, with pull-ups at the LM629."""
-LM629S = {"ok": WHOLE, "busy": STUCK, "dead": DEAD}
 
 
 class Robot(Device):
@@ -87,20 +86,12 @@ class Robot(Device):
         fault_text(what)
 
     def break_hardware(self, what: str) -> None:
-        board = self.board
-        # Where the chips are depends on where the run was cut; up to the processor's own time it does not.
-        board.sync(board.cpu.cycles * CYCLE_TICKS)
         word, *values = what.split()
+        break_board(self.board, what)
         if word == "encoder":
             encoder = self.drive.left_encoder if values[0] == "left" else self.drive.right_encoder
             level_a, level_b = ENCODERS[values[1]]
             encoder.hold(level_a, level_b)
-        elif word == "lm629":
-            (board.left if values[0] == "left" else board.right).port.broken = LM629S[values[1]]
-        elif word == "power":
-            board.dip()
-        elif word == "flip":
-            Device.break_hardware(self, what)
         # The network has broken the wire to RXD.
 
     def is_whole(self) -> bool:
