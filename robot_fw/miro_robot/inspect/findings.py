@@ -43,6 +43,7 @@ _NOTES = {
     sanitizer.LEAK: ("stack", "leaves bytes on the stack in each turn"),
     sanitizer.CUT_OFF: ("uart", "writes SBUF while a character goes out"),
     sanitizer.UNREAD: ("uart", "clears RI, and SBUF is not read before the next character"),
+    sanitizer.OVERRUN: ("uart", "loses a character: the one before was still waiting"),
     sanitizer.TIMER: ("timer", "reads the halves of timer {number} apart: the low one may overflow between"),
     sanitizer.NO_RAM: ("memory", "reaches for {address}, where there is no RAM"),
     sanitizer.NO_CODE: ("memory", "reads code at {address}, outside of the image"),

@@ -11,9 +11,9 @@ cdef int _TORN_READ, _TORN_WRITE, _LOST, _SHARED, _SFRS, _EA
 cdef int _CALL, _RET, _RETI, _PUSH, _CLEAR, _JBC, _MOVC, _MOVX_READ, _MOVX_WRITE
 cdef int _SP, _SCON, _SBUF, _RI_BIT, _RI, _MODES, _TL0, _TH1, _TL2, _TH2
 cdef long long _NEVER
-cdef int _DEEPEST, _GROWTHS, _NEAR, _AGAIN, _IN_CODE
+cdef int _DEEPEST, _GROWTHS, _NEAR, _AGAIN, _IN_CODE, _ENOUGH
 cdef int _REGISTERS, _RET_OF_INTERRUPT, _RETI_OF_CALL, _OVERWRITTEN, _UNBALANCED, _LEAK
-cdef int _CUT_OFF, _UNREAD, _TIMER, _NO_RAM, _NO_CODE, _CONST, _UNWRITTEN
+cdef int _CUT_OFF, _UNREAD, _TIMER, _NO_RAM, _NO_CODE, _CONST, _UNWRITTEN, _OVERRUN
 
 cdef class Sanitizer(Watcher):
     cdef unsigned char reads[256]
@@ -39,7 +39,7 @@ cdef class Sanitizer(Watcher):
     cdef int known_pair[65536]
     cdef int known_open[65536]
     cdef readonly dict pairs, events, notes
-    cdef int ram, put_generic, a, scon, depth, from_reset, sent_pc, unread, cleared_pc
+    cdef int ram, put_generic, a, scon, overruns, depth, from_reset, sent_pc, unread, cleared_pc
     cdef long long sent_tick
     cdef unsigned char written[65536]
     cdef unsigned char special[256]
@@ -58,8 +58,9 @@ cdef class Sanitizer(Watcher):
     cdef Interrupts interrupts
     cdef long long tick
 
-    @cython.locals(opcode=int, line=int, form=int, place=int, scon=int)
+    @cython.locals(opcode=int, line=int, form=int, place=int, scon=int, uart=Uart)
     cpdef executed(self, Cpu cpu, int pc, long long start)
+    cpdef ran(self, Cpu cpu, long long start)
     @cython.locals(direct=int)
     cdef inline int _place(self, Cpu cpu, int form, int pc, int opcode) noexcept
     @cython.locals(level=int, key=int, at=int, kind=int, seen='unsigned int', bit='unsigned int')
@@ -72,6 +73,7 @@ cdef class Sanitizer(Watcher):
     cdef _look(self, Cpu cpu)
     cpdef int reader(self, int source, int key) noexcept
     cpdef int writer(self, int source, int key) noexcept
+    cdef _lost(self, int pc)
     cdef _note(self, int mistake, int pc, int other, int which)
     @cython.locals(timer=int, timers=Timers)
     cdef _read_register(self, Cpu cpu, int address, int pc)

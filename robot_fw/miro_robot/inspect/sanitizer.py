@@ -20,12 +20,12 @@ _SFRS, _EA = 0x80, 0x80
 _CALL, _RET, _RETI, _PUSH, _CLEAR, _JBC, _MOVC, _MOVX_READ, _MOVX_WRITE = range(1, 10)  # see `SPECIAL`
 _SP, _SCON, _SBUF, _RI_BIT, _RI, _MODES, _NEVER = 0x81, 0x98, 0x99, 0x98, 1, 0xC0, 1 << 61
 _TL0, _TH1, _TL2, _TH2 = 0x8A, 0x8D, 0xCC, 0xCD
-_DEEPEST, _GROWTHS, _NEAR, _AGAIN, _IN_CODE = 128, 3, 8, 12, 0x80
+_DEEPEST, _GROWTHS, _NEAR, _AGAIN, _IN_CODE, _ENOUGH = 128, 3, 8, 12, 0x80, 1 << 30
 TORN_READ, TORN_WRITE, LOST, SHARED = 1, 2, 3, 4
 REGISTERS, RET_OF_INTERRUPT, RETI_OF_CALL, OVERWRITTEN, UNBALANCED, LEAK = 1, 2, 3, 4, 5, 6
-CUT_OFF, UNREAD, TIMER, NO_RAM, NO_CODE, CONST, UNWRITTEN = 7, 8, 9, 10, 11, 12, 13
+CUT_OFF, UNREAD, TIMER, NO_RAM, NO_CODE, CONST, UNWRITTEN, OVERRUN = 7, 8, 9, 10, 11, 12, 13, 14
 _REGISTERS, _RET_OF_INTERRUPT, _RETI_OF_CALL, _OVERWRITTEN, _UNBALANCED, _LEAK = 1, 2, 3, 4, 5, 6
-_CUT_OFF, _UNREAD, _TIMER, _NO_RAM, _NO_CODE, _CONST, _UNWRITTEN = 7, 8, 9, 10, 11, 12, 13
+_CUT_OFF, _UNREAD, _TIMER, _NO_RAM, _NO_CODE, _CONST, _UNWRITTEN, _OVERRUN = 7, 8, 9, 10, 11, 12, 13, 14
 _TORN_READ, _TORN_WRITE, _LOST, _SHARED = TORN_READ, TORN_WRITE, LOST, SHARED
 
 
@@ -72,6 +72,7 @@ class Sanitizer(Watcher):
         self.notes: dict[tuple[int, int, int, int], int] = {}
         self.a = 0
         self.scon = 0
+        self.overruns = 0
         self.depth = 0  # of the functions and routines that are known to be under way
         self.frame_sp = [0] * 128  # SP after the call
         self.frame_back = [0] * 128  # where it has to return to
@@ -99,6 +100,7 @@ class Sanitizer(Watcher):
     def attached(self, cpu: Cpu) -> None:
         self.interrupts = cpu.peripherals.interrupts
         self.scon = cpu.peripherals.uart.scon
+        self.overruns = cpu.peripherals.uart.overruns
         self.from_reset = 1 if cpu.cycles == 0 else 0
         self._look(cpu)
 
@@ -127,13 +129,26 @@ class Sanitizer(Watcher):
                 self._write(place, pc, self.constant[opcode])
         if self.special[opcode]:
             self._special(cpu, self.special[opcode], pc, opcode)
-        scon = cpu.peripherals.uart.scon
+        uart = cpu.peripherals.uart
+        scon = uart.scon
+        if uart.overruns > self.overruns:
+            self._lost(pc)
         if scon != self.scon:
             if scon & ~self.scon & _RI:
                 self._received()
             self.scon = scon
         self.a = cpu.a
         self._look(cpu)
+
+    def ran(self, cpu: Cpu, start: int) -> None:
+        """Firmware that never looks at the serial port has lost characters by now."""
+        if cpu.peripherals.uart.overruns > self.overruns:
+            self._lost(cpu.pc)
+
+    def _lost(self, pc: int) -> None:
+        """The first character: the others have the same cause."""
+        self.overruns = _ENOUGH
+        self._note(_OVERRUN, pc, -1, 0)
 
     def interrupted(self, cpu: Cpu, source: int, pc: int, start: int) -> None:
         self.step += 1

@@ -28,6 +28,7 @@ cdef class Uart:
     cdef int rx_count, rx_last, rx_votes, rx_bits
     cdef long long rx_done
     cdef int rx_frame
+    cdef readonly int overruns
 
     cpdef int clear(self, long long cycle) except -1
     cdef int abort(self, long long tick) except -1

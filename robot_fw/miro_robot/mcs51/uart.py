@@ -71,11 +71,12 @@ class Uart:
         "rx_done": TICK,
         "rx_frame": ("i", 0, 0x1FF),
     }
-    NOT_STATE = ("bus", "interrupts")
+    NOT_STATE = ("bus", "interrupts", "overruns")
 
     def __init__(self, bus: Bus, interrupts: Interrupts) -> None:
         self.bus = bus
         self.interrupts = interrupts
+        self.overruns = 0  # characters lost because RI was still up
         self.rxd = Line()
         self.rxd.settled_tick = NEVER_TICK  # nothing connected: mark, until a producer sets it
         self.txd = Line()
@@ -357,6 +358,8 @@ class Uart:
         last = self.rx_frame >> 8
         # Checked when the character is complete, not before: SBUF may be read until then (4316E section 2.13).
         if self.scon & _RI or (self.scon & _SM2 and not last):
+            if last or not self.scon & _SM2:
+                self.overruns += 1
             return
         self.received = self.rx_frame & 0xFF
         self.scon = (self.scon & (0xFF ^ _RB8)) | (_RB8 if last else 0)

@@ -130,6 +130,8 @@ loop:
         ("JNB RI,loop\n CLR RI", b"abc", {(found.UNREAD, 0)}),
         ("JBC RI,got\n SJMP loop\ngot:\n NOP", b"abc", {(found.UNREAD, 0)}),
         ("JBC RI,got\n SJMP loop\ngot:\n MOV A,SBUF", b"abc", set()),
+        ("NOP", b"abc", {(found.OVERRUN, 0)}),
+        ("NOP", b"a", set()),
         ("JNB RI,loop\n ANL SCON,#0FEh", b"abc", {(found.UNREAD, 0)}),
     ],
 )
