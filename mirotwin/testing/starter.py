@@ -19,7 +19,7 @@ from mirotwin.testing.vsix import packed
 _IN_WHEEL = Path(__file__).parent / "examples"
 _IN_TREE = Path(__file__).parents[2] / "examples"
 EXAMPLES = {
-    "firmware": "mine.ihx; late.ihx stops 15 ms late when the host falls silent.",
+    "firmware": "mine.ihx; late.ihx stops 15 ms late, race.ihx goes deaf by chance.",
     "hil-steps": "Scenario files with steps: send, wait, expect, reset.",
     "campaign": "A campaign of 240 runs: radio, latency, two controllers.",
     "two_teams": "A scenario with six robots, to look at pictures.",
@@ -76,7 +76,8 @@ def contents_of(name: str) -> dict[str, bytes]:
 def _images() -> Iterator[tuple[str, Path]]:
     own = image_path()
     yield "mine.ihx", own
-    yield "late.ihx", folder() / "firmware" / "late.ihx"
+    for name in ("late.ihx", "race.ihx"):
+        yield name, folder() / "firmware" / name
     for name, suffixes in _DEBUG_FILES.items():
         yield from ((f"{name}{suffix}", own.with_suffix(suffix)) for suffix in suffixes)
 
