@@ -9,7 +9,7 @@ import msgspec
 
 from miro_robot.image import Image
 from miro_robot.inspect import sanitizer
-from miro_robot.inspect.sanitizer import LOST, SHARED, TORN_READ, TORN_WRITE, Sanitizer
+from miro_robot.inspect.sanitizer import CHECKED, LOST, SHARED, TORN_READ, TORN_WRITE, Sanitizer
 from miro_robot.inspect.sanitizer_layout import XRAM, Layout
 from miro_robot.inspect.symbol_names import SymbolNames
 from miro_robot.mcs51.opcodes import INTERRUPTS
@@ -29,6 +29,7 @@ _SAYS = {
     TORN_READ: "reads {name} in pieces in {function}",
     TORN_WRITE: "writes {name} in pieces in {function}",
     LOST: "loads {name}, changes and stores it in {function}",
+    CHECKED: "looks at {name}, then takes one away in {function}",
     SHARED: "stores {name} for {function}",
 }
 _NOTES = {
@@ -109,7 +110,9 @@ class Reader:
             if pair[0] == LOST and key in self.layout.elements:
                 continue  # a buffer is handed over by a flag, which nobody sees
             touches: Iterable[Callable[[int, int], int]]
-            touches = (seen.writer, seen.reader) if pair[0] == TORN_WRITE else (seen.writer,)
+            touches = {TORN_WRITE: (seen.writer, seen.reader), CHECKED: (seen.zeroer,)}.get(
+                pair[0], (seen.writer,)
+            )
             for source in range(len(INTERRUPTS)):
                 between = next((at for touch in touches if (at := touch(source, key)) >= 0), -1)
                 if sources_open >> source & 1 and between >= 0:

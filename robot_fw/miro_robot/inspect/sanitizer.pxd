@@ -7,7 +7,7 @@ from miro_robot.mcs51.timers cimport Timers
 from miro_robot.mcs51.uart cimport Uart
 
 cdef int _PLACES, _XRAM, _SCALAR, _LOCAL, _FIRST, _SECOND, _INDIRECT, _DPTR, _PAGE
-cdef int _TORN_READ, _TORN_WRITE, _LOST, _SHARED, _SFRS, _EA
+cdef int _TORN_READ, _TORN_WRITE, _LOST, _SHARED, _SFRS, _EA, _CHECKED, _DEC, _DJNZ, _SOON
 cdef int _CALL, _RET, _RETI, _PUSH, _CLEAR, _JBC, _MOVC, _MOVX_READ, _MOVX_WRITE
 cdef int _SP, _SCON, _SBUF, _RI_BIT, _RI, _MODES, _TL0, _TH1, _TL2, _TH2
 cdef long long _NEVER
@@ -26,6 +26,8 @@ cdef class Sanitizer(Watcher):
     cdef int writers[394752]
     cdef long long read_step[197376]
     cdef long long write_step[197376]
+    cdef long long zero_step[197376]
+    cdef int zeroers[394752]
     cdef int read_pc[197376]
     cdef int write_pc[197376]
     cdef unsigned int read_seen[197376]
@@ -71,6 +73,11 @@ cdef class Sanitizer(Watcher):
     cdef _pair(self, int kind, int first, int pc, long long since, int key)
     @cython.locals(open_now=int, priorities=int, source=int)
     cdef _look(self, Cpu cpu)
+    @cython.locals(key=int)
+    cdef _zeroed(self, int place, int pc)
+    @cython.locals(at=int)
+    cdef _decrement(self, int place, int pc)
+    cpdef int zeroer(self, int source, int key) noexcept
     cpdef int reader(self, int source, int key) noexcept
     cpdef int writer(self, int source, int key) noexcept
     cdef _lost(self, int pc)

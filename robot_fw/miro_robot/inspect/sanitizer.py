@@ -21,12 +21,13 @@ _CALL, _RET, _RETI, _PUSH, _CLEAR, _JBC, _MOVC, _MOVX_READ, _MOVX_WRITE = range(
 _SP, _SCON, _SBUF, _RI_BIT, _RI, _MODES, _NEVER = 0x81, 0x98, 0x99, 0x98, 1, 0xC0, 1 << 61
 _TL0, _TH1, _TL2, _TH2 = 0x8A, 0x8D, 0xCC, 0xCD
 _DEEPEST, _GROWTHS, _NEAR, _AGAIN, _IN_CODE, _ENOUGH = 128, 3, 8, 12, 0x80, 1 << 30
-TORN_READ, TORN_WRITE, LOST, SHARED = 1, 2, 3, 4
+TORN_READ, TORN_WRITE, LOST, SHARED, CHECKED = 1, 2, 3, 4, 5
 REGISTERS, RET_OF_INTERRUPT, RETI_OF_CALL, OVERWRITTEN, UNBALANCED, LEAK = 1, 2, 3, 4, 5, 6
 CUT_OFF, UNREAD, TIMER, NO_RAM, NO_CODE, CONST, UNWRITTEN, OVERRUN = 7, 8, 9, 10, 11, 12, 13, 14
 _REGISTERS, _RET_OF_INTERRUPT, _RETI_OF_CALL, _OVERWRITTEN, _UNBALANCED, _LEAK = 1, 2, 3, 4, 5, 6
 _CUT_OFF, _UNREAD, _TIMER, _NO_RAM, _NO_CODE, _CONST, _UNWRITTEN, _OVERRUN = 7, 8, 9, 10, 11, 12, 13, 14
-_TORN_READ, _TORN_WRITE, _LOST, _SHARED = TORN_READ, TORN_WRITE, LOST, SHARED
+_TORN_READ, _TORN_WRITE, _LOST, _SHARED, _CHECKED = 1, 2, 3, 4, 5
+_DEC, _DJNZ, _SOON = 0x15, 0xD5, 6
 
 
 class Sanitizer(Watcher):
@@ -51,6 +52,8 @@ class Sanitizer(Watcher):
         self.write_pc = [0] * 197376
         self.read_seen = [0] * 197376  # bytes of the variable that this access has had
         self.write_seen = [0] * 197376
+        self.zero_step = [0] * 197376
+        self.zeroers = [0] * 394752
         self.line = [0] * 3
         self.began = [0] * 3  # step at which the level came to its line
         self.serving = [0] * 3
@@ -113,6 +116,8 @@ class Sanitizer(Watcher):
             self.line[self.level] = line
             self.began[self.level] = self.step
         self.tick = 12 * start
+        if opcode in (_DEC, _DJNZ) and self.kind_of[cpu.rom[pc + 1]] == _SCALAR:
+            self._decrement(cpu.rom[pc + 1], pc)
         form = self.reads[opcode]
         if form:
             place = self._place(cpu, form, pc, opcode)
@@ -127,6 +132,8 @@ class Sanitizer(Watcher):
                 self._write_register(cpu, -place, pc)
             elif self.kind_of[place]:
                 self._write(place, pc, self.constant[opcode])
+                if self.level and place < _XRAM and cpu.iram[place] == 0:
+                    self._zeroed(place, pc)
         if self.special[opcode]:
             self._special(cpu, self.special[opcode], pc, opcode)
         uart = cpu.peripherals.uart
@@ -212,12 +219,27 @@ class Sanitizer(Watcher):
         self.write_step[at] = self.step
         self.write_pc[at] = self.serving[level] << 16 | pc
 
+    def _zeroed(self, place: int, pc: int) -> None:
+        """A routine left 0 there."""
+        key = self.key_of[place]
+        self.zero_step[self.level * _PLACES + key] = self.step
+        self.zeroers[self.serving[self.level] * _PLACES + key] = pc + 1
+
+    def _decrement(self, place: int, pc: int) -> None:
+        """Of what was just looked at: where a routine leaves 0 between both, it becomes 255."""
+        at = self.level * _PLACES + self.key_of[place]
+        if self.level < 2 and self.read_step[at] and self.step - self.read_step[at] <= _SOON:
+            self._pair(_CHECKED, self.read_pc[at], pc, self.read_step[at], self.key_of[place])
+
     def _pair(self, kind: int, first: int, pc: int, since: int, key: int) -> None:
         """The instructions at `first`, in step `since`, and at `pc`, now, belong together."""
         first &= 0xFFFF
         for higher in range(self.level + 1, 3):
             at = higher * _PLACES + key
-            if self.write_step[at] > since:
+            if kind == _CHECKED:
+                if self.zero_step[at] > since:
+                    self.events.setdefault((kind, first, pc), (self.tick, self.write_pc[at], key))
+            elif self.write_step[at] > since:
                 self.events.setdefault((kind, first, pc), (self.tick, self.write_pc[at], key))
             elif kind == _TORN_WRITE and self.read_step[at] > since:
                 self.events.setdefault((kind, first, pc), (self.tick, self.read_pc[at], key))
@@ -260,6 +282,10 @@ class Sanitizer(Watcher):
     def writer(self, source: int, key: int) -> int:
         """Where the routine of `source` first wrote it; -1 if it never did."""
         return self.writers[source * _PLACES + key] - 1
+
+    def zeroer(self, source: int, key: int) -> int:
+        """Where the routine of `source` last left 0 there; -1 if it never did."""
+        return self.zeroers[source * _PLACES + key] - 1
 
     def _note(self, mistake: int, pc: int, other: int, which: int) -> None:
         if (mistake, pc, other, which) not in self.notes:

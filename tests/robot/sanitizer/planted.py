@@ -15,7 +15,7 @@ volatile unsigned int pair[2];
 volatile unsigned char buffer[4];
 volatile unsigned int copy, taken;
 volatile unsigned long longer;
-unsigned char plain;
+unsigned char plain, left, waiting, reload;
 
 void tick(void) __interrupt(1)
 {
@@ -36,6 +36,9 @@ void tick(void) __interrupt(1)
     }
     taken = out;
     plain++;
+    left = 0;
+    waiting++;
+    reload = 9;
 }
 
 void main(void)
@@ -64,11 +67,18 @@ void main(void)
         plain++;
         if (flag)
             flag = 0;
+        if (left) /* race left */
+            left--;
+        if (waiting)
+            waiting--;
+        if (reload)
+            reload--;
         if (full) {
             buffer[1] |= 2;
             full = 0;
         }
         place.x = flag;
+        left = 3;
     }
 }
 """
