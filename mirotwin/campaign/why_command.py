@@ -196,7 +196,7 @@ def _lines(options: WhyOptions, curve: Curve, spec: RunSpec, streams: list[Path]
 
 
 def _table(curve: Curve) -> Table:
-    table = plain_table(right=COLUMNS)
+    table = plain_table(COLUMNS[0], right=COLUMNS[1:])
     for row in cells(curve):
         table.add_row(*row)
     return table
