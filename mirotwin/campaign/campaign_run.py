@@ -23,7 +23,7 @@ from mirotwin.campaign.running import Tally
 from mirotwin.campaign.worker import RunOutcome
 from mirotwin.campaign.workers import Processes
 from mirotwin.shell.command import Argument, Option, Options, Word, command_of
-from mirotwin.shell.options import FORCE, JOBS, OUT, PATH, QUIET, SET, Engine
+from mirotwin.shell.options import FORCE, JOBS, OUT, PATH, QUIET, SET, Engine, Whole
 from mirotwin.shell.outputs import told_when_full
 from mirotwin.shell.plugin_files import PluginFiles
 from mirotwin.shell.program import complain, show_line, tell_notes
@@ -61,7 +61,7 @@ class CampaignOptions(Options, frozen=True, kw_only=True):
         int | None,
         Option(
             metavar="N",
-            type=click.IntRange(1, 100_000),
+            type=Whole(1, 100_000),
             help="So many bits of RAM that turn over, a run each, beside runs without. `show` says what came of"
             " them, by variable.",
         ),

@@ -272,7 +272,7 @@ def test_a_campaign_goes_on_with_the_same_expectations_only(mirotwin):
     command = ("campaign", "run", "c.toml", "--out", "c.parquet", "--jobs", 1)
     assert mirotwin(*command, "--expect", "frames_accepted_min=1")[0] == 0
     code, out, _ = mirotwin(*command, "--expect", "frames_accepted_min=1")
-    assert (code, out) == (0, "c.parquet has all 3 runs already\n")
+    assert (code, out.splitlines()[0]) == (0, "c.parquet has all 3 runs already")
     for more in ((), ("--expect", "frames_accepted_min=2"), ("--expect", "stands_still")):
         assert "c.parquet: holds the results of another campaign" in mirotwin.ends(2, *command, *more)
 
