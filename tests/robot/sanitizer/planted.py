@@ -134,7 +134,68 @@ void main(void)
 OVERLAID = {"mix", "half", "filled", "_moduint"}
 """Functions of OVERLAYS whose bytes its interrupt overwrites."""
 
-_PLANTED = re.compile(r"/\* ([a-z]+ [\w.]*) \*/")
+TIMES = """\
+#include <8052.h>
+volatile unsigned int now, began;
+volatile unsigned char low, high, wait, due;
+
+unsigned int count(void)
+{
+    return TH0 << 8 | TL0; /* timer */
+}
+
+unsigned int right(void)
+{
+    unsigned char top, rest;
+    do {
+        top = TH0;
+        rest = TL0;
+    } while (top != TH0);
+    return (unsigned int)top << 8 | rest;
+}
+
+void pause(void)
+{
+    for (wait = 0; wait < 20; wait++)
+        ;
+}
+
+void main(void)
+{
+    TMOD = 0x11;
+    TR0 = 1;
+    TR1 = 1;
+    TR2 = 1;
+    for (;;) {
+        now = count();
+        pause();
+        low = TL1; /* timer */
+        high = TH1;
+        pause();
+        began = TH2 << 8 | TL2; /* timer */
+        pause();
+        if ((TH0 << 8 | TL0) - now > 500) /* timer */
+            due = 1;
+        pause();
+        began = right();
+        pause();
+        TR1 = 0;
+        low = TL1;
+        high = TH1;
+        TR1 = 1;
+        TR2 = 0;
+        began = TH2 << 8 | TL2;
+        TR2 = 1;
+        began = RCAP2H << 8 | RCAP2L;
+        low = TL0;
+        pause();
+        TH0 = 0xF8;
+        TL0 = 0x30;
+    }
+}
+"""
+
+_PLANTED = re.compile(r"/\* ([a-z]+)(?: ([\w.]+))? \*/")
 
 
 def planted(text, file="program.c"):
@@ -142,5 +203,4 @@ def planted(text, file="program.c"):
     marked = (
         (number, _PLANTED.search(line)) for number, line in enumerate(text.splitlines(), 1) if "/*" in line
     )
-    words = [(*mark[1].split(" "), number) for number, mark in marked if mark]
-    return {f"{kind} {file}:{number} {name}".strip() for kind, name, number in words}
+    return {f"{mark[1]} {file}:{number} {mark[2] or ''}".strip() for number, mark in marked if mark}

@@ -9,7 +9,7 @@ from miro_robot.inspect.sanitizer_layout import layout_of
 from miro_robot.inspect.watcher import attach
 from miro_robot.mcs51.cpu import Cpu
 from tests.robot.inspect.programs import build
-from tests.robot.sanitizer.planted import OVERLAID, OVERLAYS, RACES, planted
+from tests.robot.sanitizer.planted import OVERLAID, OVERLAYS, RACES, TIMES, planted
 from tests.states import snapshot
 
 
@@ -57,6 +57,11 @@ def test_bytes_that_functions_share_are_found_where_an_interrupt_uses_them(tmp_p
     found, _ = watched(build(tmp_path, OVERLAYS), 60_000)
     assert {one.kind for one in found} == {"overlay"}
     assert {one.function for one in found} == OVERLAID
+
+
+def test_halves_of_timers_read_apart_are_found_and_correct_idioms_are_not(tmp_path):
+    found, _ = watched(build(tmp_path, TIMES), 20_000)
+    assert {one.key for one in found} == planted(TIMES)
 
 
 def test_a_watched_run_ends_in_the_state_of_one_that_is_not(races):

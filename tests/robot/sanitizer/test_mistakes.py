@@ -86,6 +86,9 @@ sub:
     {sub}
 """
 
+ODD = "MOV A,R6\n JB ACC.0,odd\n"
+"""Skips what stands before the label `odd` in every second turn."""
+
 
 @pytest.mark.parametrize(
     ("body", "sub", "wanted"),
@@ -101,6 +104,17 @@ sub:
         ("PUSH ACC", "RET", {(found.LEAK, 0)}),
         ("LCALL sub", "POP DPH\n POP DPL\n PUSH ACC\n PUSH DPL\n PUSH DPH\n RET", {(found.LEAK, 0)}),
         ("LCALL sub", "MOV R5,#4\nmore:\n PUSH ACC\n DJNZ R5,more\n MOV SP,#52h\n RET", set()),
+        ("PUSH ACC\n PUSH B", "RET", {(found.LEAK, 0)}),
+        ("MOV 30h,SP\n PUSH ACC\n PUSH B\n MOV SP,30h", "RET", set()),
+        (f"{ODD} PUSH ACC\nodd:\n NOP", "RET", {(found.LEAK, 0)}),
+        (f"PUSH ACC\n{ODD} NOP\nodd:\n POP ACC", "RET", set()),
+        (f"PUSH ACC\n PUSH B\n{ODD} POP B\nodd:\n POP ACC", "RET", {(found.LEAK, 0)}),
+        (f"PUSH ACC\n PUSH B\n{ODD} NOP\nodd:\n POP B\n POP ACC", "RET", set()),
+        ("PUSH ACC\n LCALL sub", "RET", {(found.LEAK, 0)}),  # a parameter that its caller leaves there
+        ("PUSH ACC\n LCALL sub\n DEC SP", "RET", set()),
+        ("INC SP\n LCALL sub", "RET", {(found.LEAK, 0)}),
+        ("LCALL sub\naway:\n NOP", "DEC SP\n LJMP away", {(found.LEAK, 0)}),  # half of the return address
+        ("LCALL sub\naway:\n NOP", "DEC SP\n DEC SP\n LJMP away", set()),
     ],
 )
 def test_calls_and_the_stack(body, sub, wanted):
@@ -142,9 +156,29 @@ def test_the_serial_port(body, received, wanted):
 TIMED = """
     MOV TMOD,#11h
     SETB TR0
+    SETB TR1
+    MOV T2CON,#4
 loop:
     {body}
     SJMP loop
+far:
+    MOV R6,#20
+far1:
+    DJNZ R6,far1
+    RET
+low:
+    MOV R7,TL0
+    RET
+high:
+    MOV R6,TH0
+    RET
+now:
+    MOV R6,TH0
+    MOV R7,TL0
+    MOV A,TH0
+    XRL A,R6
+    JNZ now
+    RET
 """
 
 
@@ -156,11 +190,19 @@ loop:
         ("again:\n MOV B,TH0\n MOV R7,TL0\n MOV A,TH0\n CJNE A,B,again\n LCALL far", set()),
         ("CLR TR0\n MOV A,TL0\n MOV B,TH0\n SETB TR0\n LCALL far", set()),
         ("MOV A,TL0\n LCALL far", set()),
+        ("MOV A,TL1\n MOV B,TH1\n LCALL far", {(found.TIMER, 1)}),
+        ("CLR TR1\n MOV A,TL1\n MOV B,TH1\n SETB TR1\n LCALL far", set()),
+        ("MOV A,TH2\n MOV B,TL2\n LCALL far", {(found.TIMER, 2)}),
+        ("CLR TR2\n MOV A,TH2\n MOV B,TL2\n SETB TR2\n LCALL far", set()),
+        ("MOV A,RCAP2L\n MOV B,RCAP2H\n LCALL far", set()),  # a capture stands still
+        ("LCALL low\n LCALL high\n LCALL far", {(found.TIMER, 0)}),
+        ("LCALL now\n LCALL far", set()),
+        ("MOV TMOD,#12h\n MOV A,TL0\n MOV B,TH0\n LCALL far", set()),  # TH0 is only what TL0 begins with
+        ("MOV A,TL0\n MOV B,TH1\n LCALL far", set()),
     ],
 )
 def test_halves_of_a_timer(body, wanted):
-    far = "\nfar:\n MOV R6,#20\nfar1:\n DJNZ R6,far1\n RET"
-    assert mistakes(TIMED.format(body=body) + far) == wanted
+    assert mistakes(TIMED.format(body=body)) == wanted
 
 
 @pytest.mark.parametrize(
