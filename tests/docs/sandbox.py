@@ -162,7 +162,11 @@ FUNCTIONS = {
     "protocol/README.md": question,
 }
 
-COMPILED = {*(name for name, put in FUNCTIONS.items() if put is not question), "docs/howto/own-firmware.md"}
+COMPILED = {
+    *(name for name, put in FUNCTIONS.items() if put is not question),
+    "docs/howto/own-firmware.md",
+    "docs/howto/sanitize.md",
+}
 """Pages that need a compiler for the 8051."""
 
 _SHORT = "mirotwin run fig6 --set duration_s=0.2 --no-figure -q --out"
