@@ -104,7 +104,7 @@ class Sanitized:
         for device in world.devices:
             reader = self._reader(device.image)
             sanitizer = Sanitizer(reader.layout, ram_of(device))
-            attach(device.board.cpu, sanitizer)
+            attach(device.board.cpu, sanitizer).once.append(sanitizer)
             self._pending.append((reader, sanitizer))
 
     def take(self) -> list[Finding]:

@@ -107,6 +107,10 @@ class Sanitizer(Watcher):
         self.from_reset = 1 if cpu.cycles == 0 else 0
         self._look(cpu)
 
+    def resumed(self, cpu: Cpu) -> None:
+        """The count of lost characters is no state: it does not go back."""
+        self.overruns = max(self.overruns, cpu.peripherals.uart.overruns)
+
     def executed(self, cpu: Cpu, pc: int, start: int) -> None:
         self.step += 1
         self.level_steps[self.level] += 1

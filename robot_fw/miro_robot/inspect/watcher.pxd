@@ -6,6 +6,7 @@ cdef int _VECTOR, _VECTOR_STEP, _CALL_CYCLES
 
 cdef class Watcher:
     cpdef attached(self, Cpu cpu)
+    cpdef resumed(self, Cpu cpu)
     cpdef detached(self, Cpu cpu)
     cpdef starting(self, Cpu cpu)
     cpdef executed(self, Cpu cpu, int pc, long long start)
@@ -15,7 +16,8 @@ cdef class Watcher:
 
 cdef class Inspector:
     cdef readonly Cpu cpu
-    cdef public list watchers
+    cdef public list watchers, once
+    cdef readonly list held
 
     @cython.locals(watcher=Watcher)
     cpdef int run(self, long long until_cycle) except -1

@@ -21,6 +21,9 @@ class Watcher:
     def attached(self, cpu: Cpu) -> None:
         """The watcher was attached."""
 
+    def resumed(self, cpu: Cpu) -> None:
+        """The CPU is where the watcher saw it last, after a piece of which it was told nothing (`Inspector.pause`)."""
+
     def detached(self, cpu: Cpu) -> None:
         """The watcher was detached."""
 
@@ -44,11 +47,29 @@ class Watcher:
 
 
 class Inspector:
-    """Runs `cpu` for its watchers. `Cpu.run` hands over to the inspector in `Cpu.inspector`."""
+    """Runs `cpu` for its watchers. `Cpu.run` hands over to the inspector in `Cpu.inspector`.
+
+    `once`: watchers that have to see each instruction once, also where a wait runs a piece, goes back and runs it again
+    in part. The wait pauses them for all passes but the last. `held`: those that are paused now.
+    """
 
     def __init__(self, cpu: Cpu) -> None:
         self.cpu = cpu
         self.watchers: list[Watcher] = []
+        self.once: list[Watcher] = []
+        self.held: list[Watcher] = []
+
+    def pause(self) -> None:
+        """Tells nothing to those that have to see each instruction once."""
+        self.held = [watcher for watcher in self.watchers if watcher in self.once]
+        self.watchers = [watcher for watcher in self.watchers if watcher not in self.once]
+
+    def resume(self) -> None:
+        """Tells them again, where the CPU was when they were paused."""
+        held, self.held = self.held, []
+        self.watchers = [*self.watchers, *held]
+        for watcher in held:
+            watcher.resumed(self.cpu)
 
     def run(self, until_cycle: int) -> int:
         """What `Cpu.run_alone` does, in steps; the same state comes out, and the same reason for stopping."""
@@ -127,7 +148,7 @@ def detach(cpu: Cpu, *watchers: Watcher) -> None:
     inspector = cpu.inspector
     if isinstance(inspector, Inspector):
         inspector.watchers = [watcher for watcher in inspector.watchers if watcher not in watchers]
-        if not inspector.watchers:
+        if not inspector.watchers and not inspector.held:
             cpu.inspector = None
         for watcher in watchers:
             watcher.detached(cpu)

@@ -16,6 +16,7 @@ import msgspec
 from miro_exact.clock import NEVER_TICK
 from miro_exact.state import Flat
 from miro_protocol.decoder import Decoder, Received
+from miro_robot.inspect.watcher import Inspector
 from miro_sim.world.conditions import Condition
 from miro_sim.world.events import PC, Cursor, Event
 from miro_sim.world.machine import Machine, require
@@ -135,22 +136,40 @@ class Waits:
         read = [cursor.next for cursor in self.cursors.values()]
         states = [state.save() for state in self.states]
         before = len(self.backlog), read, states, watch.save(), world.mark()
-        begun_tick = world.tick
-        world.run_piece(until_tick)
+        inspectors = self._inspectors()
+        for inspector in inspectors:
+            inspector.pause()
+        end_tick, reached = self._end_of_piece(watch, before, until_tick)
+        if inspectors:
+            for inspector in inspectors:
+                inspector.resume()
+            self._again_to(watch, before, end_tick)
+        self.backlog += reached
+
+    def _end_of_piece(self, watch: Watch, before: Before, until_tick: int) -> tuple[int, list[Entry]]:
+        """Runs to the end of the piece, which is returned, with the event that the logs will not show."""
+        begun_tick = self.world.tick
+        self.world.run_piece(until_tick)
         self._gather(watch)
         wanted = [entry for entry in self.backlog if watch.wants(entry[1])]
         if not wanted:
-            return
+            return until_tick, []
         first, event = min(wanted, key=itemgetter(0))
-        if first[0] < until_tick:
-            tick = max(first[0], begun_tick)
-            self._again_to(watch, before, tick)
-            if any(key == first for key, _ in self.backlog):
-                return
-            if event.what == "reached":  # the CPU stands before it and has not looked at it again
-                self.backlog.append((first, event))
-            else:  # it happens with the cycle that begins there
-                self._again_to(watch, before, tick + 1)
+        if first[0] >= until_tick:
+            return until_tick, []
+        tick = max(first[0], begun_tick)
+        self._again_to(watch, before, tick)
+        if any(key == first for key, _ in self.backlog):
+            return tick, []
+        if event.what == "reached":  # the CPU stands before it and has not looked at it again
+            return tick, [(first, event)]
+        self._again_to(watch, before, tick + 1)  # it happens with the cycle that begins there
+        return tick + 1, []
+
+    def _inspectors(self) -> list[Inspector]:
+        """Those with watchers that have to see each instruction once."""
+        found = [device.board.cpu.inspector for line in self.world.lines for device in line.devices]
+        return [one for one in found if isinstance(one, Inspector) and one.once]
 
     def _again_to(self, watch: Watch, before: Before, tick: int) -> None:
         """Goes back and runs the piece again, to `tick`."""

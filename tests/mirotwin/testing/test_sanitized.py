@@ -2,6 +2,7 @@
 
 import json
 import shutil
+from pathlib import Path
 
 import pytest
 
@@ -32,6 +33,7 @@ void main(void)
     }
 }
 """
+EXAMPLES = Path(__file__).parents[3] / "examples/boards"
 RACE = "race program.c:17 turns"
 BOARD = 'name = "blink"\nchip = "at89c52"\ncrystal_hz = 24_000_000\n'
 SCENARIO = """\
@@ -108,6 +110,40 @@ def test_a_session_fails_for_a_race_in_a_green_test(built, tmp_path):
     assert done.returncode == 1
     assert "may race  program.c:17 reads turns in pieces in main" in done.stdout
     assert "first in blink.scenario.toml::blink" in done.stdout
+
+
+POLL = """\
+scenario = "silent"
+duration_s = 1.0
+
+[[step]]
+pause_ms = 30
+
+[[step]]
+send = "poll"
+slot = 0
+
+[[step]]
+wait_for = "answer"
+within_ms = 200
+"""
+
+
+def test_what_a_wait_runs_twice_is_seen_once(mirotwin, tmp_path):
+    """The wait for an answer goes back to its last bit, and the robot sends a part of it again."""
+    (tmp_path / "poll.scenario.toml").write_text(POLL)
+    plain = mirotwin("test", tmp_path / "poll.scenario.toml")
+    assert plain[0] == 0
+    assert mirotwin("test", tmp_path / "poll.scenario.toml", "--sanitize") == plain
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("scenario", sorted(EXAMPLES.glob("*/*.scenario.toml")), ids=lambda path: path.stem)
+def test_tests_of_the_example_boards_are_silent(mirotwin, scenario):
+    code, out, _ = mirotwin("test", scenario)
+    noted = mirotwin("test", scenario, "--sanitize")
+    assert (code, out) == (0, noted[1])
+    assert noted[0] == 0
 
 
 def test_conform_finds_nothing_in_the_robots_firmware(mirotwin):
