@@ -52,7 +52,7 @@ def sanitize(options: SanitizeOptions) -> int:
     run = open_window(options)
     image = with_debug_files(run.image)
     layout = layout_of(image)
-    if not layout.lines:
+    if not layout.has_variables:
         complain(f"{image.path.name}: no .cdb beside it: races and overlays are not observable")
     sanitizer = Sanitizer(layout, ram_of(run.device))
     code = look(run, options, sanitizer)

@@ -7,7 +7,7 @@ from miro_robot.mcs51.timers cimport Timers
 from miro_robot.mcs51.uart cimport Uart
 
 cdef int _PLACES, _XRAM, _SCALAR, _LOCAL, _FIRST, _SECOND, _INDIRECT, _DPTR, _PAGE
-cdef int _TORN_READ, _TORN_WRITE, _LOST, _SHARED, _SFRS, _EA, _CHECKED, _DEC, _DJNZ, _SOON
+cdef int _TORN_READ, _TORN_WRITE, _LOST, _SHARED, _SFRS, _EA, _CHECKED, _DEC, _DJNZ, _SOON, _NO_TIMERS
 cdef int _CALL, _RET, _RETI, _PUSH, _CLEAR, _JBC, _MOVC, _MOVX_READ, _MOVX_WRITE
 cdef int _SP, _SCON, _SBUF, _RI_BIT, _RI, _MODES, _TL0, _TH1, _TL2, _TH2
 cdef long long _NEVER
@@ -35,9 +35,11 @@ cdef class Sanitizer(Watcher):
     cdef int line[3]
     cdef long long began[3]
     cdef int serving[3]
+    cdef long long entered[3]
     cdef long long last_open[6]
     cdef long long step, closed
-    cdef int level, open, priorities
+    cdef int level, open
+    cdef long long priorities
     cdef int known_pair[65536]
     cdef int known_open[65536]
     cdef readonly dict pairs, events, notes
@@ -71,7 +73,7 @@ cdef class Sanitizer(Watcher):
     cdef _write(self, int place, int pc, int constant)
     @cython.locals(higher=int, at=int, sources=int, source=int)
     cdef _pair(self, int kind, int first, int pc, long long since, int key)
-    @cython.locals(open_now=int, priorities=int, source=int)
+    @cython.locals(open_now=int, priorities='long long', source=int, timers=int, due=int)
     cdef _look(self, Cpu cpu)
     @cython.locals(key=int)
     cdef _zeroed(self, int place, int pc)

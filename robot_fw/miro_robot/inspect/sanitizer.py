@@ -28,6 +28,7 @@ _REGISTERS, _RET_OF_INTERRUPT, _RETI_OF_CALL, _OVERWRITTEN, _UNBALANCED, _LEAK =
 _CUT_OFF, _UNREAD, _TIMER, _NO_RAM, _NO_CODE, _CONST, _UNWRITTEN, _OVERRUN = 7, 8, 9, 10, 11, 12, 13, 14
 _TORN_READ, _TORN_WRITE, _LOST, _SHARED, _CHECKED = 1, 2, 3, 4, 5
 _DEC, _DJNZ, _SOON = 0x15, 0xD5, 6
+_NO_TIMERS = 0x15  # the sources that are none, as bits of IE
 
 
 class Sanitizer(Watcher):
@@ -57,6 +58,7 @@ class Sanitizer(Watcher):
         self.line = [0] * 3
         self.began = [0] * 3  # step at which the level came to its line
         self.serving = [0] * 3
+        self.entered = [0] * 3  # step at which the level's routine began
         self.last_open = [0] * 6
         self.known_pair = [0] * 65536
         self.known_open = [0] * 65536
@@ -165,6 +167,7 @@ class Sanitizer(Watcher):
         self.step += 1
         self._look(cpu)
         self.serving[self.level] = source
+        self.entered[self.level] = self.step
         self.line[self.level] = -1
         scon = cpu.peripherals.uart.scon
         if scon & ~self.scon & _RI:
@@ -190,7 +193,9 @@ class Sanitizer(Watcher):
         if level and not self.readers[self.serving[level] * _PLACES + key]:
             self.readers[self.serving[level] * _PLACES + key] = pc + 1
         if self.kind_of[place] == _LOCAL:
-            if self.write_step[at]:
+            if (
+                self.write_step[at] > self.entered[level]
+            ):  # what a routine keeps for its next call has one user
                 self._pair(_SHARED, self.write_pc[at], pc, self.write_step[at], key)
         else:
             bit = 1 << (place - key)
@@ -261,7 +266,11 @@ class Sanitizer(Watcher):
     def _look(self, cpu: Cpu) -> None:
         """Which sources may interrupt before the next instruction, and at which level that is."""
         interrupts = self.interrupts
-        priorities = interrupts.in_service << 16 | interrupts.ip << 8 | interrupts.ie
+        timers = cpu.peripherals.timers.control
+        due = (2 if timers & 0x30 else 0) | (8 if timers & 0xC0 else 0)  # those that run, or have run over
+        if cpu.peripherals.timer2.control & 0xC4:
+            due |= 0x20
+        priorities = due << 24 | interrupts.in_service << 16 | interrupts.ip << 8 | interrupts.ie
         blocked = cpu.blocked == cpu.cycles
         if priorities == self.priorities and not blocked:
             return
@@ -269,7 +278,7 @@ class Sanitizer(Watcher):
         self.level = min(interrupts.in_service, 2)
         open_now = 0
         if interrupts.ie & _EA and self.level < 2 and not blocked:
-            open_now = interrupts.ie & 0x3F
+            open_now = interrupts.ie & (_NO_TIMERS | due)
             if self.level:
                 open_now &= interrupts.ip
         if self.open & ~open_now:

@@ -51,6 +51,11 @@ class Layout(msgspec.Struct, frozen=True, eq=False):
     put_generic: int
     debug: DebugInfo
 
+    @property
+    def has_variables(self) -> bool:
+        """Whether C variables are known: Keil's maps have lines, and no sizes of variables."""
+        return bool(self.names or self.local_names)
+
 
 def layout_of(image: Image) -> Layout:
     """Raises ImageError for debug files of another image."""

@@ -22,6 +22,8 @@ void tick(void) __interrupt(1) { stamp++; }
 void main(void)
 {
     volatile unsigned char turns = 20;
+    TMOD = 1;
+    TR0 = 1;
     ET0 = 1;
     EA = 1;
     TF0 = 1;
@@ -31,7 +33,7 @@ void main(void)
         copy = stamp;
 }
 """
-"""Its interrupt comes before the first turn of its loop, and never again."""
+"""Its interrupt comes before the first turn of its loop, and again only after 65536 cycles."""
 
 
 @pytest.fixture(scope="module")

@@ -204,3 +204,59 @@ def planted(text, file="program.c"):
         (number, _PLANTED.search(line)) for number, line in enumerate(text.splitlines(), 1) if "/*" in line
     )
     return {f"{mark[1]} {file}:{number} {mark[2] or ''}".strip() for number, mark in marked if mark}
+
+
+SILENT = {
+    "what a routine keeps for its next call": """\
+#include <8052.h>
+unsigned char twice(unsigned char value)
+{
+    static unsigned char before;
+    unsigned char sum = before + value;
+    before = value;
+    return sum;
+}
+void tick(void) __interrupt(1)
+{
+    static unsigned char phase, kept[4];
+    static unsigned int turns;
+    turns++;
+    kept[turns & 3] = (kept[turns & 3] << 1) | P1_0;
+    P0 = twice(phase);
+    phase = (phase + 1) & 3;
+}
+void main(void)
+{
+    TMOD = 2;
+    TH0 = 6;
+    ET0 = 1;
+    TR0 = 1;
+    EA = 1;
+    for (;;)
+        ;
+}
+""",
+    "variables that are set before their timer runs": """\
+#include <8052.h>
+unsigned int period = 4000;
+void tick(void) __interrupt(1)
+{
+    TH0 = period >> 8;
+    TL0 = period;
+    period += 100;
+}
+void main(void)
+{
+    IE = 0x82;
+    TMOD = 1;
+    period = P1;
+    period += 4000;
+    TH0 = period >> 8;
+    TL0 = period & 0xFF;
+    TR0 = 1;
+    for (;;)
+        ;
+}
+""",
+}
+"""Programs without a mistake."""

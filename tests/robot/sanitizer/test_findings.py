@@ -9,7 +9,7 @@ from miro_robot.inspect.sanitizer_layout import layout_of
 from miro_robot.inspect.watcher import attach
 from miro_robot.mcs51.cpu import Cpu
 from tests.robot.inspect.programs import build
-from tests.robot.sanitizer.planted import OVERLAID, OVERLAYS, RACES, TIMES, planted
+from tests.robot.sanitizer.planted import OVERLAID, OVERLAYS, RACES, SILENT, TIMES, planted
 from tests.states import snapshot
 
 
@@ -57,6 +57,21 @@ def test_bytes_that_functions_share_are_found_where_an_interrupt_uses_them(tmp_p
     found, _ = watched(build(tmp_path, OVERLAYS), 60_000)
     assert {one.kind for one in found} == {"overlay"}
     assert {one.function for one in found} == OVERLAID
+
+
+@pytest.mark.parametrize("program", SILENT.values(), ids=SILENT)
+def test_nothing_is_found(program, tmp_path):
+    found, cpu = watched(build(tmp_path, program), 200_000)
+    assert found == []
+    assert cpu.peripherals.timers.control & 0x10  # it came to its loop
+
+
+def test_a_timer_that_starts_early_is_not_passed_over(tmp_path):
+    started = SILENT["variables that are set before their timer runs"].replace(
+        "IE = 0x82;", "IE = 0x82; TR0 = 1;"
+    )
+    found, _ = watched(build(tmp_path, started), 200_000)
+    assert {one.variable for one in found if one.kind == "race"} == {"period"}
 
 
 def test_halves_of_timers_read_apart_are_found_and_correct_idioms_are_not(tmp_path):
