@@ -116,9 +116,8 @@ def why(options: WhyOptions) -> int:
         for stream, text in two.items():
             folder.part(stream).write_bytes(encodable(text).encode())
         place = place_at(run.as_sent({}), curve.jump_tick)
-        lines = _lines(
-            options, curve, spec, [folder.path / stream for stream in two], f"{place}" if place else ""
-        )
+        c_line = f"{Path(place.file).name}:{place.line}" if place else ""  # the same bytes in any folder
+        lines = _lines(options, curve, spec, [folder.path / stream for stream in two], c_line)
         folder.part(PAGE).write_bytes(page(curve, lines))
     if not options.quiet:
         show(_table(curve))
