@@ -4,7 +4,7 @@
     python -m benchmarks.bench2 --check [--draw WORD]        # a run of each entry and case again; WORD draws the seeds
     python -m benchmarks.bench2 --write docs/benchmark.md    # the tables of the page, and its picture
     python -m benchmarks.bench2 --compare mine.parquet --with "body_frame, ekf"    # either may be a file of results
-    python -m benchmarks.bench2 --fresh my_law.py --draw WORD    # seeds that nobody could tune on
+    python -m benchmarks.bench2 --fresh my_law.py --draw WORD    # seeds for a referee
 
 The file holds each run of each entry: settled or not, truth error, camera error and the first digits of the digest. So
 an entry is compared with a baseline without running that again, and every run can be checked alone. The runs of Bench
@@ -50,7 +50,7 @@ LEARNING = "camera.self_calibration='lines'"
 
 
 class Entry(NamedTuple):
-    """A law with an estimator: what it sets, and FILE.py:CLASS of a law that is none of ours."""
+    """A law with an estimator: its settings, and FILE.py:CLASS of a law that Mirotwin does not ship."""
 
     settings: tuple[str, ...]
     law: str = ""
@@ -237,7 +237,7 @@ def entered(text: str) -> list[Row]:
 
 
 def fresh(source: bytes, word: str) -> range:
-    """The seeds by which a referee scores an entry: nobody knows them before both its source and the word are there."""
+    """Seeds for a referee, from the hash of an entry's source and a word chosen after the source was handed in."""
     first = 10_000 + int(hashlib.sha256(source + word.encode()).hexdigest()[:8], 16)
     return range(first, first + plan_of(BENCH, ENTRIES[f"{REFERENCE}, {NONE}"]).design.seed_count)
 

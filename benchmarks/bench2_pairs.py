@@ -83,7 +83,7 @@ def _error(row: Row, figure: str, number: int) -> float | None:
 
 
 def questions() -> list[tuple[str, str, str]]:
-    """What is asked before anything is measured: a title, the first entry and the second."""
+    """Comparisons of filters and of laws: a title, the first entry and the second."""
     laws = [
         (f"{law}, {EKF}, against {REFERENCE}, {EKF}", f"{REFERENCE}, {EKF}", f"{law}, {EKF}")
         for law in LAWS
