@@ -18,8 +18,8 @@ SHOWS = """\
 * **The law makes less of it.** With `ekf`, {others} against `{reference}`:
   of {law_count} comparisons {law_better} are better in truth, {law_worse} worse, and {law_unknown} cannot be told
   after correction.
-* **Where wheels slip fewer runs settle with `ekf`**, for a reason that was not tested: of {slip_count} runs {slip_none} settle
-  without an estimator, {slip_predict} with `predict`, {slip_ekf} with `ekf`.
+* **Where wheels slip fewer runs settle with `ekf`**, for a reason that was not tested: of {slip_count} runs
+  {slip_none} settle without an estimator, {slip_predict} with `predict`, {slip_ekf} with `ekf`.
 * **A wrong camera hides which entry is nearer.** In the plain class errors decide {plain_camera} of {pair_count}
   comparisons by camera, {plain_truth} in truth, and {plain_opposite} in opposite ways; self-calibrated,
   {learning_camera} by camera, {learning_truth} in truth, and {learning_opposite} in opposite ways.

@@ -193,9 +193,8 @@ class Sanitizer(Watcher):
         if level and not self.readers[self.serving[level] * _PLACES + key]:
             self.readers[self.serving[level] * _PLACES + key] = pc + 1
         if self.kind_of[place] == _LOCAL:
-            if (
-                self.write_step[at] > self.entered[level]
-            ):  # what a routine keeps for its next call has one user
+            # What a routine keeps for its next call has one user.
+            if self.write_step[at] > self.entered[level]:
                 self._pair(_SHARED, self.write_pc[at], pc, self.write_step[at], key)
         else:
             bit = 1 << (place - key)
