@@ -1,5 +1,6 @@
 """Tables of `benchmarks`, small enough for every test run: disturbances, the improved chain, one frame."""
 
+import csv
 import itertools
 import math
 import re
@@ -7,7 +8,7 @@ from pathlib import Path
 
 import pytest
 
-from benchmarks import chain, disturbances, frame_loss, improved, one_frame_page
+from benchmarks import chain, disturbances, frame_loss, improved, one_frame_page, vision
 from benchmarks.interval import clopper_pearson
 from benchmarks.one_frame import Way, edges_of
 from miro_exact.clock import CONTROL_PERIOD_TICKS
@@ -18,7 +19,37 @@ from mirotwin.campaign.chances import wilson
 from mirotwin.campaign.single import run_single
 from tests.sim.world.rig import finished, image, world_of
 
-PAGE = Path(__file__).parents[2] / "docs/disturbances.md"
+ROOT = Path(__file__).parents[2]
+PAGE = ROOT / "docs/disturbances.md"
+
+
+def stored(name):
+    """The rows of a table in the folder benchmarks."""
+    with (ROOT / "benchmarks" / name).open(newline="", encoding="utf-8") as stream:
+        return list(csv.reader(stream))
+
+
+def rows_of(page):
+    """The cells of all table rows of a page."""
+    lines = [line for line in page.read_text(encoding="utf-8").splitlines() if line.startswith("| ")]
+    return [[cell.strip() for cell in line.strip("|").split(" | ")] for line in lines]
+
+
+def test_the_table_of_the_eye_has_each_case_and_the_page_has_rows_of_it():
+    head, *rows = stored("vision.csv")
+    assert head == list(vision.COLUMNS)
+    assert [row[0] for row in rows] == list(vision.cases())
+    known = {row[0]: [row[1], row[3], row[4], row[6]] for row in rows}
+    _, *shown = rows_of(ROOT / "docs/vision.md")
+    assert shown
+    for name, *cells in shown:
+        assert known[name] == cells
+
+
+def test_a_row_of_the_eye_has_a_figure_in_each_column():
+    row = vision.row("binary", vision.measure(vision.cases()["binary"], 20, 0))
+    assert len(row) == len(vision.COLUMNS)
+    assert row[-2:] == ["20", "0"]
 
 
 @pytest.mark.parametrize("case", disturbances.CASES[1:], ids=lambda case: case.name)
