@@ -1,7 +1,8 @@
 """Each disturbance alone, on three controllers: `python -m benchmarks.disturbances`.
 
-Prints the table of docs/disturbances.md: position error (truth against reference, root mean square over the last
-second) as the median over the seeds, and of how many runs the robot was outside 3 cm or 0.15 rad in the last second.
+Prints a CSV table, that of benchmarks/disturbances.csv: position error (truth against reference, root mean square over
+the last second) as the median over the seeds, and in how many runs the robot was outside 3 cm or 0.15 rad in the last
+second.
 The base is the variant `ideal` with a little white noise on the posture, so that seeds differ: 0.3 cm and 0.6 degrees
 at three standard deviations. Estimators are told the delay of the camera and nothing else.
 
@@ -12,6 +13,7 @@ Ctrl-C stops it after the cells that are under way, and prints the rows that are
 from __future__ import annotations
 
 import argparse
+import csv
 import sys
 import time
 from collections.abc import Iterable, Iterator
@@ -119,21 +121,14 @@ def settings_of(case: Case, controller: str) -> list[str]:
     return ["variant=ideal", *SMALL_NOISE, *steered, *case.settings]
 
 
-def row(case: Case, cells: dict[tuple[str, str], list[Figure]]) -> str:
-    """One line of the table: a cell for each figure and controller."""
-    parts = [case.name]
-    for figure in FIGURES:
-        for controller in CONTROLLERS:
-            runs = cells[figure, controller]
-            lost = sum(run.settled_s is None for run in runs)
-            parts.append(f"{median(run.position_cm for run in runs):.2f}" + (f" ({lost})" if lost else ""))
-    return f"| {' | '.join(parts)} |"
+COLUMNS = ("disturbance", "scenario", "controller", "position_cm", "outside_runs")
 
 
-def head() -> Iterator[str]:
-    """The first two lines."""
-    yield f"| disturbance | {' | '.join(f'`{figure}` {name}' for figure in FIGURES for name in CONTROLLERS)} |"
-    yield "|---" * (1 + len(FIGURES) * len(CONTROLLERS)) + "|"
+def rows(case: Case, cells: dict[tuple[str, str], list[Figure]]) -> Iterator[tuple[str, ...]]:
+    """The rows of a case: one for each figure and controller."""
+    for (figure, controller), runs in cells.items():
+        outside = sum(run.settled_s is None for run in runs)
+        yield case.name, figure, controller, f"{median(run.position_cm for run in runs):.2f}", f"{outside}"
 
 
 def chosen(only: Iterable[str]) -> list[int]:
@@ -178,8 +173,8 @@ def main(arguments: list[str] | None = None) -> int:
         interrupted = True
     finally:
         print(file=sys.stderr)
-    for line in head():
-        print(line)
+    writer = csv.writer(sys.stdout, lineterminator="\n")
+    writer.writerow(COLUMNS)
     for number in numbers:
         line = {
             (figure, name): found.get((number, figure, name), [])
@@ -187,7 +182,7 @@ def main(arguments: list[str] | None = None) -> int:
             for name in CONTROLLERS
         }
         if all(line.values()):
-            print(row(CASES[number], line))
+            writer.writerows(rows(CASES[number], line))
     return 130 if interrupted else 0
 
 

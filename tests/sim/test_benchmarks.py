@@ -82,12 +82,11 @@ def test_names_of_groups_and_parts_of_names_choose_cases():
 def test_a_table_of_one_seed_has_a_figure_in_each_cell(capsys):
     assert disturbances.main(["--only", "base", "--seeds", "0", "--jobs", "1"]) == 0
     out, err = capsys.readouterr()
-    *head, row = out.splitlines()
-    assert head == list(disturbances.head())
-    cells = [cell.strip() for cell in row.strip("|").split("|")]
-    assert cells[0] == "none"
-    assert all(re.fullmatch(r"0\.\d\d|1\.\d\d", cell) for cell in cells[1:])
-    assert len(cells) == 7
+    head, *rows = csv.reader(out.splitlines())
+    assert head == list(disturbances.COLUMNS)
+    cells = itertools.product(("none",), disturbances.FIGURES, disturbances.CONTROLLERS)
+    assert [tuple(row[:3]) for row in rows] == list(cells)
+    assert all(re.fullmatch(r"0\.\d\d|1\.\d\d", row[3]) for row in rows)
     assert "6 of 6 cells" in err
 
 
@@ -99,10 +98,17 @@ def test_what_cannot_be_run_is_refused(arguments, capsys):
     assert "Traceback" not in capsys.readouterr().err
 
 
-def test_the_page_has_a_row_for_each_case():
-    table = PAGE.read_text(encoding="utf-8").partition("## The bridge and the gears")[0]
-    rows = re.findall(r"^\| (.+?) \| \d", table, re.MULTILINE)
-    assert rows == [case.name for case in disturbances.CASES]
+def test_the_table_of_disturbances_has_a_row_for_each_case_and_the_page_has_rows_of_it():
+    head, *rows = stored("disturbances.csv")
+    assert head == list(disturbances.COLUMNS)
+    names = [case.name for case in disturbances.CASES]
+    keys = itertools.product(names, disturbances.FIGURES, disturbances.CONTROLLERS)
+    assert [tuple(row[:3]) for row in rows] == list(keys)
+    known = {tuple(key): f"{cm} ({outside})" if int(outside) else cm for *key, cm, outside in rows}
+    shown = [row for row in rows_of(PAGE) if row[0] in names]
+    assert len(shown) >= 10
+    for name, *cells in shown:
+        assert cells == [known[name, "fig6", controller] for controller in disturbances.CONTROLLERS]
 
 
 IMPROVED = {case.name: case for case in improved.cases()}
