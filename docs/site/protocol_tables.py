@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import sys
 from collections.abc import Iterable, Iterator, Sequence
+from itertools import groupby
 
 from miro_protocol import table
 from miro_protocol.table import DOWNLINK, TELEMETRY, Field, Format, FrameType, Opcode
@@ -23,15 +24,14 @@ def _rows(heads: Sequence[str], rows: Iterable[Sequence[object]]) -> Iterator[st
 
 
 def _frames() -> Iterator[str]:
-    heads = ("frame", "preamble", "sync", "HDR", "payload", "CRC", "characters", "air time", "layout byte")
+    heads = ("frame", "preamble", "payload", "characters", "air time", "layout byte")
     return _rows(heads, (_frame(form) for form in (*DOWNLINK.values(), TELEMETRY)))
 
 
 def _frame(form: Format) -> tuple[object, ...]:
     preamble = f"55h x{form.lead.count(0x55)}, FFh"
-    sync = " ".join(f"{byte:02X}h" for byte in form.sync)
     air = f"{form.air_ticks / table.TICKS_PER_MS:.2f} ms"
-    return form.name, preamble, sync, 1, form.payload_size, 2, form.wire_size, air, f"{form.layout:02X}h"
+    return form.name, preamble, form.payload_size, form.wire_size, air, f"{form.layout:02X}h"
 
 
 def _types() -> Iterator[str]:
@@ -46,14 +46,26 @@ def _fields() -> Iterator[str]:
     for opcode in Opcode:
         rows += _offsets(f"1, opcode {opcode:d} {opcode.name.lower()}", table.SERVICE_DATA[opcode], start)
     rows += _offsets("2", table.TELEMETRY_FIELDS, 0)
-    return _rows(("in type", "offset", "field", "is", "range", "unit", "meaning"), rows)
+    return _rows(("in type", "offset", "field", "range", "meaning"), rows)
 
 
 def _offsets(where: str, fields: Iterable[Field], start: int) -> Iterator[Sequence[object]]:
+    """A row for each run of neighbouring fields that have range and meaning in common."""
+    placed = []
     for field in fields:
-        limits = f"{field.low}..{field.high}"
-        yield where, start, field.name, field.c_type, limits, field.unit, field.meaning
+        placed.append((start, field))
         start += field.size
+    for (limits, meaning), run in groupby(placed, key=lambda pair: _about(pair[1])):
+        offsets, names = zip(*((str(offset), field.name) for offset, field in run), strict=True)
+        yield where, ", ".join(offsets), ", ".join(names), limits, meaning
+
+
+def _about(field: Field) -> tuple[str, str]:
+    """Type with its limits, unless it may have all values; meaning with its unit, without the field's own name."""
+    whole = (field.low, field.high) == (0, (1 << 8 * field.size) - 1)
+    limits = field.c_type if whole else f"{field.c_type} {field.low}..{field.high}"
+    meaning = field.meaning.replace(f" {field.name},", ",")
+    return limits, f"{meaning}, {field.unit}" if field.unit else meaning
 
 
 def _flags() -> Iterator[str]:
@@ -63,15 +75,17 @@ def _flags() -> Iterator[str]:
 
 def _times() -> Iterator[str]:
     rows = (
-        ("bit, host / robot", table.HOST_BIT_TICKS, f"{table.ROBOT_BIT_TICKS} in robot to host"),
-        ("carrier before the first start bit", table.KEYUP_TICKS, ""),
-        ("spacing of characters", table.SPACING_TICKS, f"+-{table.SPACING_TOLERANCE_TICKS}"),
-        ("any other number is fresh again", table.FRESH_AGAIN_TICKS, "after the last fresh frame"),
-        ("failsafe: smooth stop", table.FAILSAFE_STOP_TICKS, "without a fresh frame"),
-        ("failsafe: motors off", table.FAILSAFE_OFF_TICKS, "without a fresh frame"),
+        ("bit of the host", table.HOST_BIT_TICKS),
+        ("bit of a robot", table.ROBOT_BIT_TICKS),
+        ("carrier before the first start bit", table.KEYUP_TICKS),
+        ("from start bit to start bit", table.SPACING_TICKS),
+        ("tolerance of that, either way", table.SPACING_TOLERANCE_TICKS),
+        ("any other `seq` is fresh again", table.FRESH_AGAIN_TICKS),
+        ("failsafe: smooth stop", table.FAILSAFE_STOP_TICKS),
+        ("failsafe: motors off", table.FAILSAFE_OFF_TICKS),
     )
-    texts = ((name, ticks, f"{ticks / table.TICKS_PER_MS:.6g}", note) for name, ticks, note in rows)
-    return _rows(("time", "ticks of 24 MHz", "ms", ""), texts)
+    texts = ((name, ticks, f"{ticks / table.TICKS_PER_MS:.6g}") for name, ticks in rows)
+    return _rows(("time", "ticks of 24 MHz", "ms"), texts)
 
 
 if __name__ == "__main__":

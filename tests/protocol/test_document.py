@@ -53,6 +53,40 @@ def test_the_page_names_every_module_for_users():
     assert modules <= named
 
 
+def test_the_frame_that_is_shown_byte_by_byte_is_the_encoders():
+    """Made from its clear bytes by the rules of the page alone, too."""
+    shown = README.partition("### A frame, byte by byte")[2].partition("### ")[0]
+    rows = dict(re.findall(r"^(PN9|clear|CRC|wire) +(.+)$", shown, re.MULTILINE))
+    pn9, clear, wire = (bytes.fromhex(rows[name]) for name in ("PN9", "clear", "wire"))
+    assert pn9 == whitening.STRING[: len(pn9)] == pn9_by_its_polynomial(len(pn9))
+    assert len(pn9) == max(form.body_size + 2 for form in table.DOWNLINK.values())
+    assert crc16(b"123456789") == 0xCD72
+    assert f"{crc16(bytes([0x13]) + clear):04x}" == rows["CRC"]
+    body = clear + crc16(bytes([0x13]) + clear).to_bytes(2, "little")
+    assert wire == bytes.fromhex("5555555555ff2dd4") + bytes(a ^ b for a, b in zip(body, pn9, strict=False))
+    assert wire == encode(TeamFrame(type=3, seq=4, velocities=((300, -300), (0, 0), (1000, 1000))), 3)
+
+
+def crc16(data):
+    register = 0xFFFF
+    for byte in data:
+        register ^= byte
+        for _ in range(8):
+            register = register >> 1 ^ (0xAC9A if register & 1 else 0)
+    return register ^ 0xFFFF
+
+
+def pn9_by_its_polynomial(length):
+    register, out = 0x1FF, bytearray()
+    for _ in range(length):
+        byte = 0
+        for place in range(8):
+            byte |= (register & 1) << place
+            register = register >> 1 | ((register ^ register >> 5) & 1) << 8
+        out.append(byte)
+    return bytes(out)
+
+
 # The firmware's header
 
 

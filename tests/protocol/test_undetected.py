@@ -1,7 +1,7 @@
 """What gets past the checks: nothing of few wrong bits and short bursts, and of many as much as exact weights say.
 
 Experiments have a size for every test run; `python -m benchmarks.undetected` is the same at full size, and
-protocol/README.md has its figures.
+`benchmarks/undetected.csv` has its figures.
 """
 
 from itertools import combinations

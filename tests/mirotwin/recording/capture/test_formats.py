@@ -85,9 +85,8 @@ def test_what_the_library_writes_as_a_stream_is_a_stream(sent):
 
 def test_the_specification_names_all_forms():
     page = (Path(__file__).parents[4] / "protocol/README.md").read_text(encoding="utf-8")
-    table = page.partition("| it begins with | taken for |")[2].partition("\n\n")[0]
-    named = [name for row in table.splitlines()[2:] for name in row.split("|")[-2].strip().split(", ")]
-    assert sorted(named) == sorted(FORMS)
+    sentence = page.partition("`--from-form` forces a form")[2].partition(" ([captures]")[0]
+    assert sorted(re.findall(r"`([^`]+)`", sentence)) == sorted(FORMS)
 
 
 BOM = "\ufeff"
