@@ -2,14 +2,16 @@
 
 from __future__ import annotations
 
-from collections.abc import Collection, Mapping, Sequence
+from collections.abc import Collection, Iterable, Mapping, Sequence
 from pathlib import Path
 from typing import Annotated
 
 import click
+import msgspec
 
 from miro_exact.bad_input import BadInput, amount
 from miro_robot.image import Image
+from miro_robot.inspect.findings import Finding
 from mirotwin.conform import baseline
 from mirotwin.conform.conform_results import RuleCases
 from mirotwin.conform.explain import explain
@@ -18,21 +20,19 @@ from mirotwin.conform.rules import ALL as EVERY_RULE
 from mirotwin.conform.rules import LONG, RULES, find, spans
 from mirotwin.conform.run import Outcome, case_names, failure_text, try_all, with_faults
 from mirotwin.desk.guard import DeskOptions
-from mirotwin.runs.sanitized import judged, line_of, read_allowed, sanitized, stale_line
+from mirotwin.runs.sanitized import SanitizerOptions, judged, read_allowed, sanitized, stale_line
 from mirotwin.shell.command import Argument, Option, Options, command_of
 from mirotwin.shell.console import plain_table, show
 from mirotwin.shell.firmware_image import load_firmware
 from mirotwin.shell.json_text import json_bytes
 from mirotwin.shell.options import (
     ALL,
-    ALLOW,
     ARTIFACTS,
     JSON,
     JUNIT,
     NAME,
     PATH,
     QUIET,
-    SANITIZE,
     SEED,
     Engine,
     StackFrom,
@@ -41,7 +41,7 @@ from mirotwin.shell.outputs import check_file
 from mirotwin.shell.program import complain, show_line
 from mirotwin.shell.progress import ProgressBar
 from mirotwin.shell.results import Results
-from mirotwin.shell.verdicts import DONE, exit_code
+from mirotwin.shell.verdicts import DONE, VERDICTS, exit_code, judge
 from mirotwin.verify.cases.artifacts import (
     FIRMWARE,
     case_lines,
@@ -100,15 +100,18 @@ class ConformOptions(Options, frozen=True, kw_only=True):
     seed: Annotated[int, SEED.saying("Seed of the noise between keyed frames.")] = 0
     stack_from: StackFrom = None
     engine: Engine = None
-    sanitize: Annotated[bool, SANITIZE] = False
-    allow: Annotated[str | None, ALLOW.saying(ALLOW.help, needs="sanitize")] = None
+    sanitizer: SanitizerOptions = SanitizerOptions()
     desk: DeskOptions = DeskOptions()
     quiet: Annotated[bool, QUIET.saying("No progress bar, and of the table the rules that failed.")] = False
 
-    def line_for(self, rule: str) -> str:
-        """The command that tries this rule again."""
+    def line_for(self, rule: str, sanitized: bool = False) -> str:
+        """The command that tries this rule again; with the sanitizer it leaves the trial, for the debugger."""
         image, seed, stack_from = self.image, self.seed, self.stack_from
-        return ConformOptions(image=image, ids=(rule,), seed=seed, stack_from=stack_from).command_line()
+        again = ConformOptions(image=image, ids=(rule,), seed=seed, stack_from=stack_from)
+        if sanitized:
+            folder = self.artifacts or Path("failed")
+            again = msgspec.structs.replace(again, sanitizer=self.sanitizer, artifacts=folder)
+        return again.command_line()
 
 
 def hidden_by(outcomes: Sequence[Outcome]) -> dict[str, list[str]]:
@@ -185,7 +188,7 @@ def conform(options: ConformOptions) -> int:
         known = baseline.read(options.baseline, options.write_baseline)
     at_port = options.desk.port
     if at_port:
-        if given := options.given("image", "explain", "artifacts", "stack_from", "seed"):
+        if given := options.given("image", "explain", "artifacts", "stack_from", "seed", "sanitize"):
             raise BadInput("", given[0], "is not for a robot at a port", "leave it out")
         from mirotwin.conform.by_answers import try_at_port  # loads pyserial
 
@@ -200,24 +203,40 @@ def conform(options: ConformOptions) -> int:
         name, sha256 = firmware.path.name, firmware.sha256
         properties = {"firmware": name, "firmware_sha256": sha256, "seed": options.seed}
         tried = try_all(
-            rules, firmware, options.seed, artifacts is not None, not options.sanitize, options.everything
+            rules,
+            firmware,
+            options.seed,
+            artifacts is not None,
+            not options.sanitizer.sanitize,
+            options.everything,
         )
     outcomes: list[Outcome] = []
     lost: BadInput | None = None
     unwritten = ""
-    allowed = read_allowed(options.allow)
-    with ProgressBar("trying rules", len(rules), quiet) as bar, sanitized(options.sanitize) as watching:
+    allowed = read_allowed(options.sanitizer.allow)
+    seen: dict[tuple[str, ...], tuple[Finding, Outcome]] = {}
+    with (
+        ProgressBar("trying rules", len(rules), quiet) as bar,
+        sanitized(options.sanitizer.sanitize) as watching,
+    ):
         try:
             for outcome in tried:
                 outcomes.append(outcome)
                 bar.to(len(outcomes))
+                for one in watching.take():
+                    if one.cause not in seen or (one.did and not seen[one.cause][0].did):
+                        seen[one.cause] = one, outcome
                 if artifacts is not None and not unwritten:
-                    unwritten = _keep(outcome, artifacts, firmware)
+                    unwritten = _keep(outcome.cases, artifacts, firmware)
         except BadInput as error:  # a robot that was lost: outcomes before that are reported
             lost = error
-    findings, stale = judged(watching.take(), allowed)
     if lost is not None and not outcomes:
         raise lost
+    findings, stale = judged([one for one, _ in seen.values()], allowed, options.sanitizer.kinds)
+    trials = [seen[one.cause][1] for one in findings]
+    if artifacts is not None:
+        sent = [(case_names(find(one.rule))[2], one.sent) for one in trials]
+        unwritten = unwritten or _keep(sent, artifacts, firmware)
     outcomes = with_faults(outcomes, rules)
     cured = [one.rule for one in outcomes if one.rule in known and one.verdict == "passed"]
     if options.baseline is not None and options.write_baseline and lost is None:
@@ -226,9 +245,13 @@ def conform(options: ConformOptions) -> int:
     rule_cases = RuleCases(
         outcomes, bool(options.ids), known, image, options.seed, artifacts, options.line_for
     )
-    verdict = rule_cases.verdict
+    found_cases = [
+        rule_cases.found(finding, trial.rule, options.line_for(trial.rule, sanitized=True))
+        for finding, trial in zip(findings, trials, strict=True)
+    ]
+    verdict = judge((rule_cases.verdict, *(one.verdict for one in found_cases)))
     reported = options.as_json or junit is not None  # then a failure runs once more, for its place
-    cases = rule_cases.cases() if reported else ()
+    cases = (*rule_cases.cases(), *found_cases) if reported else ()
     results = Results(command="conform", cases=cases, verdict=verdict, facts=properties)
     if options.as_json:
         results.print_json()
@@ -241,19 +264,18 @@ def conform(options: ConformOptions) -> int:
     if unwritten:
         complain(unwritten)
     _report_faults(outcomes)
-    complain(*watching.unseen, *(stale_line(options.allow, one) for one in stale))
-    lines = [line_of(one) for one in findings]
-    complain(*(text for _, text in lines))
+    complain(*watching.unseen, *(stale_line(options.sanitizer.allow, one) for one in stale))
+    complain(*(line for case in found_cases for line in case.lines))
     results.write_junit(junit)  # reported first: the file may fail
     if lost is not None:
         raise lost
-    return exit_code(verdict, *(one for one, _ in lines))
+    return VERDICTS[verdict].code
 
 
-def _keep(outcome: Outcome, artifacts: Path, firmware: Image) -> str:
+def _keep(cases: Iterable[tuple[str, str]], artifacts: Path, firmware: Image) -> str:
     """Leaves the cases of a rule; "" or why it cannot, for when all verdicts are reported."""
     try:
-        for name, text in outcome.cases:
+        for name, text in cases:
             write_case(artifacts / name, text)
             leave_image(artifacts, firmware)
     except (OSError, BadInput) as error:

@@ -6,17 +6,20 @@ from collections.abc import Callable, Mapping, Sequence
 from pathlib import Path
 
 from miro_robot.image import Image
+from miro_robot.inspect.findings import Finding
 from mirotwin.conform.rule import Rule
 from mirotwin.conform.rules import chapter_of, find
 from mirotwin.conform.run import Outcome, case_names, failure_text
 from mirotwin.conform.trial import trial_of
 from mirotwin.runs.failure_place import place_at
 from mirotwin.runs.result import failure_facts
+from mirotwin.runs.sanitized import line_of, place_of
 from mirotwin.runs.spec import RunSpec
 from mirotwin.shell.debug_files import Places
 from mirotwin.shell.junit import TestCase
 from mirotwin.shell.verdicts import Verdict, judge
 from mirotwin.verify.cases.artifacts import FIRMWARE, case_lines
+from mirotwin.verify.cases.replay_line import DebugLineOptions
 
 
 def counts(outcome: Outcome, named: bool, known: Mapping[str, str]) -> bool:
@@ -66,6 +69,25 @@ class RuleCases:
             does_not: Verdict = "passed" if one.rule in self._known else "not observable"
             verdicts.append(one.verdict if counts(one, self._named, self._known) else does_not)
         return judge(verdicts)
+
+    def found(self, finding: Finding, rule: str, reproduce: str) -> TestCase:
+        """What the sanitizer found in the trial of a rule. `reproduce`: the command that leaves the trial."""
+        assert self._image is not None
+        facts: dict[str, str | int | float] = {"rule": rule, "network": finding.network}
+        if finding.slot >= 0:
+            facts["slot"] = finding.slot
+        facts |= {"reproduce": reproduce}
+        facts |= failure_facts(finding.tick, place=Places(self._image).at(finding.pc))
+        line, folder = reproduce, self._artifacts
+        if folder is not None and (stream := folder / case_names(find(rule))[2]).exists():
+            image = folder / FIRMWARE
+            firmware = f"{image}" if image.exists() else None
+            facts["debug"] = line = DebugLineOptions(
+                file=f"{stream}", firmware=firmware, **place_of(finding)
+            ).command_line()
+        verdict, text = line_of(finding)
+        lines = (text, f"    {line}")
+        return TestCase(finding.key, "conform.sanitizer", verdict=verdict, lines=lines, facts=facts)
 
     def cases(self) -> list[TestCase]:
         return [self._case(outcome, find(outcome.rule)) for outcome in self._outcomes]

@@ -26,7 +26,8 @@ from mirotwin.conform.rule import Rule
 from mirotwin.conform.rule_monitor import ConformsTo
 from mirotwin.conform.rules import presupposed, presupposed_first
 from mirotwin.conform.trial import MOST_FAULTS, fault_count, run_trial, trial_of
-from mirotwin.runs.run import Run
+from mirotwin.runs.run import Run, on_world
+from mirotwin.runs.sanitized import sanitized
 from mirotwin.shell.process_pool import spare_process
 from mirotwin.shell.verdicts import Verdict, judge
 from mirotwin.verify.cases.case import SUFFIX
@@ -41,7 +42,8 @@ class Outcome(msgspec.Struct, frozen=True):
     """The result of a rule. `failures`: in the order of time, the first hundred. `faults`: (network, slot, fault) of
     its trial, the first twenty a robot; `fault_count` of all. `cases`: name and text of a file for each failure.
     `cause`: the rule is not judged, because this one failed. `hint`: what the firmware does instead, if that is known.
-    At a port, `unseen`: why answers do not show it; `unsure`: why it is not judged.
+    At a port, `unseen`: why answers do not show it; `unsure`: why it is not judged. `sent`: the stream of a trial that
+    the sanitizer watched.
     """
 
     rule: str
@@ -53,6 +55,7 @@ class Outcome(msgspec.Struct, frozen=True):
     hint: str = ""
     unseen: str = ""
     unsure: str = ""
+    sent: str = ""
 
     @property
     def verdict(self) -> Verdict:
@@ -74,9 +77,9 @@ def failure_text(failure: Failure) -> str:
     return f"{failure}".partition(": ")[2]
 
 
-def case_names(rule: Rule) -> tuple[str, str]:
-    """Files that a rule may leave: the rule's own failure, and a firmware fault in its trial."""
-    return f"{rule.id}{SUFFIX}", f"{rule.id}-fault{SUFFIX}"
+def case_names(rule: Rule) -> tuple[str, str, str]:
+    """Files that a rule may leave: its own failure, a firmware fault in its trial, and what the sanitizer watched."""
+    return f"{rule.id}{SUFFIX}", f"{rule.id}-fault{SUFFIX}", f"{rule.id}-sanitized{SUFFIX}"
 
 
 def try_rule(rule: Rule, image: Image, seed: int = 0, keep: bool = False) -> Outcome:
@@ -97,7 +100,8 @@ def try_rule(rule: Rule, image: Image, seed: int = 0, keep: bool = False) -> Out
         first = world.robots[0]
         failures = [Failure("conforms_to", first.network, first.slot, world.tick, wanted, reason)]
     cases = _cases(rule, run, failures, faults) if keep else ()
-    return Outcome(rule.id, tuple(failures), faults, fault_count(world), cases)
+    sent = run.stream() if keep and on_world.get() is not None else ""
+    return Outcome(rule.id, tuple(failures), faults, fault_count(world), cases, sent=sent)
 
 
 def _cases(
@@ -107,7 +111,7 @@ def _cases(
     faults: Sequence[tuple[int, int, FirmwareFault]],
 ) -> tuple[tuple[str, str], ...]:
     """Each of which `mirotwin replay` brings to the same verdict."""
-    own, of_fault = case_names(rule)
+    own, of_fault, _ = case_names(rule)
     cases = []
     if failures and run.world.finished:
         cases.append((own, run.stream({"conforms_to": rule.id}, str(failures[0]))))
@@ -186,7 +190,8 @@ def _try_and_explain(
     if cause:
         return msgspec.structs.replace(outcome, failures=(), cases=outcome.cases[-1:], cause=cause)
     place = (outcome.failures[0].network, image, seed)
-    hint = rule.probe(*place) if rule.probe is not None else why_lost(rule, *place)
+    with sanitized(False):  # findings are of trials
+        hint = rule.probe(*place) if rule.probe is not None else why_lost(rule, *place)
     return msgspec.structs.replace(outcome, hint=hint)
 
 

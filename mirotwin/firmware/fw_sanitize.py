@@ -7,27 +7,22 @@ from typing import Annotated
 import click
 import msgspec
 
-from miro_robot.inspect.findings import KINDS, Reader
+from miro_robot.inspect.findings import Reader
 from miro_robot.inspect.sanitizer import Sanitizer
 from miro_robot.inspect.sanitizer_layout import layout_of
 from mirotwin.firmware.subject import SubjectOptions, WindowOptions, look, open_window
-from mirotwin.runs.sanitized import judged, line_of, ram_of, read_allowed, stale_line
-from mirotwin.shell.command import Option, command_of
+from mirotwin.runs.sanitized import ALLOW, KIND, judged, line_of, ram_of, read_allowed, stale_line
+from mirotwin.shell.command import command_of
 from mirotwin.shell.debug_files import with_debug_files
 from mirotwin.shell.json_text import json_bytes
-from mirotwin.shell.options import ALLOW, AT, JSON
+from mirotwin.shell.options import AT, JSON
 from mirotwin.shell.program import complain, show_line
 from mirotwin.shell.verdicts import VERDICTS, exit_code
 
 
 class SanitizeOptions(WindowOptions, frozen=True, kw_only=True):
     COMMAND = "fw sanitize"
-    kinds: Annotated[
-        tuple[str, ...],
-        Option(
-            "--kind", type=click.Choice(tuple(KINDS)), help="Only findings of this kind; may be repeated."
-        ),
-    ] = ()
+    kinds: Annotated[tuple[str, ...], KIND] = ()
     allow: Annotated[str | None, ALLOW] = None
     as_json: Annotated[bool, JSON] = False
 
@@ -57,6 +52,8 @@ def sanitize(options: SanitizeOptions) -> int:
     sanitizer = Sanitizer(layout, ram_of(run.device))
     code = look(run, options, sanitizer)
     found, stale = judged(Reader(image, layout).findings(sanitizer), allowed, options.kinds)
+    slot = -1 if options.slot is None else options.slot
+    found = [msgspec.structs.replace(one, network=options.network or 0, slot=slot) for one in found]
     subject = {name: getattr(options, name) for name in SubjectOptions.__struct_fields__ if name != "engine"}
     lines = [_DebugLine(**subject, at=f"{one.tick}t").command_line() for one in found]
     complain(*(stale_line(options.allow, entry) for entry in stale))

@@ -4,7 +4,9 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
+from typing import Annotated, Any
 
+import click
 import msgspec
 
 from miro_exact.bad_input import BadInput
@@ -20,9 +22,29 @@ from miro_sim.world.device import Device
 from miro_sim.world.world import World
 from mirotwin.runs.result import Line
 from mirotwin.runs.run import on_world
+from mirotwin.shell.command import Option, Options
 from mirotwin.shell.debug_files import with_debug_files
+from mirotwin.shell.options import NAME
 
 REASON = "#"
+KIND = Option("--kind", type=click.Choice(tuple(KINDS)), help="Only findings of this kind; may be repeated.")
+ALLOW = Option(
+    "--allow",
+    type=NAME,
+    metavar="FILE",
+    help="Findings that are meant: lines `race robot.c:77 stamp  # why`.",
+)
+
+
+class SanitizerOptions(Options, frozen=True, kw_only=True):
+    """Whether the runs of a command are watched, and which findings count."""
+
+    HEADING = "Sanitizer"
+    sanitize: Annotated[
+        bool, Option(help="Also find what the firmware does without noticing, as `fw sanitize` does.")
+    ] = False
+    kinds: Annotated[tuple[str, ...], KIND.saying(KIND.help, needs="sanitize")] = ()
+    allow: Annotated[str | None, ALLOW.saying(ALLOW.help, needs="sanitize")] = None
 
 
 class Allowed(msgspec.Struct, frozen=True):
@@ -66,6 +88,12 @@ def judged(
     return [one for one in wanted if one.key not in meant], stale
 
 
+def place_of(finding: Finding) -> dict[str, Any]:
+    """The options of `mirotwin debug` that lead to it."""
+    slot = None if finding.slot < 0 else finding.slot
+    return {"network": finding.network or None, "slot": slot, "at": f"{finding.tick}t"}
+
+
 def line_of(finding: Finding) -> Line:
     """What happened is a fault of the firmware, what may is a failure."""
     return ("fault" if finding.did else "failed"), f"{finding}"
@@ -95,17 +123,18 @@ class Sanitized:
     def __init__(self) -> None:
         self.unseen: dict[str, None] = {}
         self._readers: dict[bytes, Reader] = {}
-        self._pending: list[tuple[Reader, Sanitizer]] = []
+        self._pending: list[tuple[Reader, Sanitizer, int, int]] = []  # with the network and the slot
         self._found: dict[tuple[str, ...], Finding] = {}
 
     def watch(self, world: World) -> None:
         """From now on; what earlier runs showed is worked out, since a sanitizer takes 10 MB."""
         self._settle()
-        for device in world.devices:
-            reader = self._reader(device.image)
-            sanitizer = Sanitizer(reader.layout, ram_of(device))
-            attach(device.board.cpu, sanitizer).once.append(sanitizer)
-            self._pending.append((reader, sanitizer))
+        for number, line in enumerate(world.lines):
+            for index, device in enumerate(line.devices):
+                reader = self._reader(device.image)
+                sanitizer = Sanitizer(reader.layout, ram_of(device))
+                attach(device.board.cpu, sanitizer).once.append(sanitizer)
+                self._pending.append((reader, sanitizer, number, device.slot if index else -1))
 
     def take(self) -> list[Finding]:
         """What was found since the last time, one for each cause."""
@@ -115,11 +144,11 @@ class Sanitized:
 
     def _settle(self) -> None:
         pending, self._pending = self._pending, []
-        for reader, sanitizer in pending:
+        for reader, sanitizer, network, slot in pending:
             for finding in reader.findings(sanitizer):
                 known = self._found.get(finding.cause)
                 if known is None or (finding.did and not known.did):
-                    self._found[finding.cause] = finding
+                    self._found[finding.cause] = msgspec.structs.replace(finding, network=network, slot=slot)
 
     def _reader(self, image: Image) -> Reader:
         if image.code not in self._readers:

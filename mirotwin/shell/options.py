@@ -117,15 +117,6 @@ QUIET = Option("-q", "--quiet", help="No progress bar, no last line.")
 JSON = Option("--json", help="Print one JSON document instead of tables.")
 JUNIT = Option("--junit", metavar="FILE.xml", type=PATH, help="Write JUnit XML, replacing the file.")
 ARTIFACTS = Option("--artifacts", metavar="DIR", type=PATH, help="Folder for what failures leave.")
-ALLOW = Option(
-    "--allow",
-    type=NAME,
-    metavar="FILE",
-    help="Findings that are meant: lines `race robot.c:77 stamp  # why`.",
-)
-SANITIZE = Option(
-    "--sanitize", help="Also find what the firmware does without noticing, as `fw sanitize` does."
-)
 NETWORK = Option("--network", type=Whole(0, 0xFFFF), help="Number of the network.")
 SLOT = Option("--slot", type=Whole(0, 4), help="Slot of the robot.")
 BAUD = Option("--baud", type=Whole(50), metavar="RATE", help="Bit rate of the serial line.")

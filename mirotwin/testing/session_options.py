@@ -32,6 +32,13 @@ _OPTIONS: tuple[tuple[str, str, type, str], ...] = (
         bool,
         "fail the session for what firmware does without noticing, such as races",
     ),
+    ("--mirotwin-sanitize-kind", "KIND", list, "only findings of this kind, such as race"),
+    (
+        "--mirotwin-sanitize-allow",
+        "FILE",
+        str,
+        "findings that are meant: lines `race robot.c:77 stamp  # why`",
+    ),
     ("--mirotwin-port", "URL", str, "run against the robots at this port, not against their twin"),
     ("--mirotwin-allow-motion", "", bool, "with a port: send what moves a robot"),
     ("--mirotwin-max-speed", "M_S", float, "with a port: refuse faster wheels (default: 0.5)"),
@@ -100,6 +107,9 @@ def check_options(config: pytest.Config) -> None:
     workers = config.getoption("numprocesses", None) or 0
     if workers > 1 and config.getoption("--mirotwin-port"):
         raise pytest.UsageError(f"--mirotwin-port: {workers} workers cannot share one port; give -n 0")
+    for option in ("--mirotwin-sanitize-kind", "--mirotwin-sanitize-allow"):
+        if config.getoption(option) and not config.getoption("--mirotwin-sanitize"):
+            raise pytest.UsageError(f"{option}: goes with --mirotwin-sanitize")
     share = config.getoption("--firmware-coverage-fail-under") or 0.0
     if not 0.0 <= share <= 100.0:
         raise pytest.UsageError(f"--firmware-coverage-fail-under: {share} is no percentage; give 0 to 100")

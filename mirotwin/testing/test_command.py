@@ -58,8 +58,8 @@ def test(options: TestOptions) -> int:
             what,
             "nothing was tested; a test is a scenario or a case in such a file",
         )
-    if desk.port and options.seed:
-        raise BadInput("", "--seed", "is not for a robot at a port", "leave it out")
+    if desk.port and (given := options.given("seed", "sanitize")):
+        raise BadInput("", given[0], "is not for a robot at a port", "leave it out")
     case = next((file for file in chosen if file.endswith(CASE_SUFFIX)), None)
     if desk.port and case is not None:
         what = "a case is judged by what is inside the twin, which no port shows"
@@ -71,14 +71,14 @@ def test(options: TestOptions) -> int:
         from mirotwin.report.report_command import leave_page  # loads the pages' library
 
         require_bokeh()
-    allowed, applied = read_allowed(options.allow), set[Allowed]()
+    allowed, applied = read_allowed(options.sanitizer.allow), set[Allowed]()
     left_out: dict[str, None] = {}
     results: list[Result] = []
     cases: list[TestCase] = []
     as_settings(options.expected)  # cases may name the checks of files, which are known from now on
     for file in chosen:
         began_s = time.perf_counter()
-        if options.sanitize:
+        if options.sanitizer.sanitize:
             result, used, unseen = run_sanitized(options, file, allowed)
             applied.update(used)
             tell_notes(note for note in unseen if note not in left_out)
@@ -103,7 +103,7 @@ def test(options: TestOptions) -> int:
         reported.print_json()
     else:
         show_line(_summary(results))
-    complain(*(stale_line(options.allow, one) for one in allowed if one not in applied))
+    complain(*(stale_line(options.sanitizer.allow, one) for one in allowed if one not in applied))
     reported.write_junit(junit)  # the verdicts are printed first, whatever becomes of their file
     if all(file.endswith(CASE_SUFFIX) for file in chosen):
         _refuse_unused(in_files(options.expected).values(), results)

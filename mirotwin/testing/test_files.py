@@ -33,11 +33,13 @@ def run_sanitized(
     """The result with what the sanitizer found, what is allowed and was found, and what it cannot observe."""
     with sanitized() as watching:
         result = run_file(options, file)
-        found, stale = judged(watching.take(), allowed)
+        found, stale = judged(watching.take(), allowed, options.sanitizer.kinds)
     lines: list[Line] = []
     for finding in found:
         verdict, text = line_of(finding)
-        lines += [(verdict, text), (verdict, f"    {options.debug_line_for(file, f'{finding.tick}t')}")]
+        lines.append((verdict, text))
+        if line := options.debug_line_for(file, finding):
+            lines.append((verdict, f"    {line}"))
     used = [one for one in allowed if one not in stale]
     verdict = judge((result.verdict, *(verdict for verdict, _ in lines)))
     return replace(result, verdict=verdict, said=[*result.said, *lines]), used, [*watching.unseen]

@@ -3,18 +3,18 @@
 from __future__ import annotations
 
 from pathlib import Path
-from typing import Annotated
+from typing import Annotated, Any
 
+from miro_robot.inspect.findings import Finding
 from mirotwin.desk.guard import DeskOptions
+from mirotwin.runs.sanitized import SanitizerOptions, place_of
 from mirotwin.shell.command import Argument, Option, Options
 from mirotwin.shell.options import (
-    ALLOW,
     ARTIFACTS,
     JSON,
     JUNIT,
     NAME,
     QUIET,
-    SANITIZE,
     SET,
     Engine,
     Firmware,
@@ -49,23 +49,20 @@ class TestOptions(Options, frozen=True, kw_only=True):
     pages: Annotated[
         bool, Option(help="Make the page of each failure, as `report` does.", needs="artifacts")
     ] = False
-    sanitize: Annotated[bool, SANITIZE] = False
-    allow: Annotated[str | None, ALLOW.saying(ALLOW.help, needs="sanitize")] = None
+    sanitizer: SanitizerOptions = SanitizerOptions()
     desk: DeskOptions = DeskOptions()
     quiet: Annotated[bool, QUIET.saying("No line for a file that passed.")] = False
 
-    def debug_line_for(self, file: str, at: str = "") -> str:
-        """The command that stands at the failed step of this scenario, or at a tick; "" where it cannot."""
-        if self.desk.port or self.expected or not file.endswith(".toml"):
+    def debug_line_for(self, file: str, finding: Finding | None = None) -> str:
+        """The command that stands at the failed step of this scenario, or at a finding; "" where it cannot."""
+        if self.desk.port or self.expected or (finding is None and not file.endswith(".toml")):
             return ""
-        return DebugLineOptions(
-            file=file,
-            firmware=self.firmware,
-            plugins=self.plugins,
-            seed=self.seed or None,
-            settings=self.settings,
-            at=at,
-        ).command_line()
+        run: dict[str, Any] = {"seed": self.seed or None, "settings": self.settings}
+        if not file.endswith(".toml"):
+            run = {}  # a case has its own
+        if finding is not None:
+            run |= place_of(finding)
+        return DebugLineOptions(file=file, firmware=self.firmware, plugins=self.plugins, **run).command_line()
 
     def line_for(self, file: str, saves: bool = False) -> str:
         """The command that gives the verdict on this scenario again; one that saves worlds needs a folder for them."""
@@ -77,8 +74,7 @@ class TestOptions(Options, frozen=True, kw_only=True):
             firmware=self.firmware,
             plugins=self.plugins,
             artifacts=self.artifacts if saves else None,
-            sanitize=self.sanitize,
-            allow=self.allow,
+            sanitizer=self.sanitizer,
             desk=self.desk,
         )
         return again.command_line()

@@ -9,7 +9,7 @@ from typing import Annotated
 from miro_robot.firmware import image_path
 from miro_robot.image import Image
 from mirotwin.shell.command import Argument, Option, Options
-from mirotwin.shell.options import FIRMWARE, NAME, SEED, SET
+from mirotwin.shell.options import FIRMWARE, NAME, NETWORK, SEED, SET, SLOT
 from mirotwin.shell.plugin_files import NO_FILES, PluginFiles
 from mirotwin.verify.expectations import Expected
 
@@ -33,6 +33,8 @@ class DebugLineOptions(CaseOptions, frozen=True, kw_only=True):
     COMMAND = "debug"
     seed: Annotated[int | None, SEED] = None
     settings: Annotated[tuple[str, ...], SET] = ()
+    network: Annotated[int | None, NETWORK] = None
+    slot: Annotated[int | None, SLOT] = None
     at: Annotated[str, Option(help="Where to stand first.")] = ""
 
 

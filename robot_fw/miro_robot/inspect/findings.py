@@ -57,7 +57,7 @@ _REGISTERS = (*(f"R{number}" for number in range(8)), "A", "B", "DPTR", "CY", "t
 class Finding(msgspec.Struct, frozen=True, order=True):
     """`did`: it happened at `tick`, else it may, for the first time there. `place`: `robot.c:77`, an address; `other`:
     the other side, "" without one; `variable`: "" without one. `pc`, `other_pc`: their instructions, -1 for none;
-    `source`: the interrupt of the other side, -1 without one.
+    `source`: the interrupt of the other side, -1 without one. `network`, `slot`: of the robot; -1: the network's first.
     """
 
     kind: str
@@ -71,6 +71,8 @@ class Finding(msgspec.Struct, frozen=True, order=True):
     pc: int = -1
     other_pc: int = -1
     source: int = -1
+    network: int = 0
+    slot: int = -1
 
     @property
     def cause(self) -> tuple[str, ...]:

@@ -1,13 +1,18 @@
 """`test --sanitize`, `conform --sanitize` and `pytest --mirotwin-sanitize`: a green run that has a race in it."""
 
 import json
+import shlex
 import shutil
 from pathlib import Path
+from xml.etree import ElementTree
 
 import pytest
 
+from tests.mirotwin.conform.images import PUSHES
+from tests.mirotwin.conftest import hex_file
 from tests.mirotwin.testing.sessions import session
 from tests.robot.inspect.programs import build
+from tests.robot.mcs51.asm import assemble
 
 BLINK = """\
 #include <8052.h>
@@ -110,6 +115,97 @@ def test_a_session_fails_for_a_race_in_a_green_test(built, tmp_path):
     assert done.returncode == 1
     assert "may race  program.c:17 reads turns in pieces in main" in done.stdout
     assert "first in blink.scenario.toml::blink" in done.stdout
+
+
+def test_a_session_has_kinds_and_an_allow_file(built, tmp_path):
+    for path in built.iterdir():
+        shutil.copy(path, tmp_path)
+    (tmp_path / "allow.txt").write_text(f"{RACE}  # a test\nrace program.c:1 gone  # stale\n")
+    allow = "--mirotwin-sanitize-allow=allow.txt"
+    for workers in ("-p", "no:xdist"), ("-p", "xdist", "-n", "2"):
+        done = session(tmp_path, "--mirotwin-sanitize", allow, *workers, tests=TESTS, child=True)
+        assert done.returncode == 0
+        assert "allow.txt:2: race program.c:1 gone was not found" in done.stdout
+        assert f"{RACE} was not found" not in done.stdout
+    done = session(tmp_path, "--mirotwin-sanitize", "--mirotwin-sanitize-kind=overlay")
+    assert done.returncode == 0
+    assert session(tmp_path, "--mirotwin-sanitize", "--mirotwin-sanitize-kind=race").returncode == 1
+    for wrong in ("--mirotwin-sanitize-kind=rare", allow):
+        needs = ["--mirotwin-sanitize"] if "rare" in wrong else []
+        assert session(tmp_path, wrong, *needs).returncode == 4
+
+
+def test_one_kind_can_be_wanted_in_a_test(mirotwin, built):
+    assert mirotwin("test", built, "--sanitize", "--kind", "overlay")[0] == 0
+    code, out, _ = mirotwin("test", built, "--sanitize", "--kind", "race")
+    assert (code, "--sanitize --kind race\n" in out) == (1, True)
+    assert mirotwin("test", built, "--kind", "race")[0] == 2
+
+
+TIMER_OF_ROBOT_1 = """
+    JNB P1.0,$
+    MOV TMOD,#11h
+    SETB TR0
+loop:
+    MOV A,TL0
+    MOV B,TH0
+    MOV R6,#20
+far:
+    DJNZ R6,far
+    SJMP loop
+"""
+TWO_ROBOTS = """\
+scenario = "silent"
+duration_s = 0.1
+
+[[network]]
+robots = 3
+
+[[network.robot]]
+slot = 0
+reference = { kind = "line", start_x_cm = 20.0, start_y_cm = 40.0 }
+
+[[network.robot]]
+slot = 1
+reference = { kind = "line", start_x_cm = 60.0, start_y_cm = 40.0 }
+"""
+
+
+def test_the_debugger_is_led_to_the_robot_that_it_is_of(mirotwin, tmp_path):
+    image = hex_file(tmp_path / "robot.ihx", assemble(TIMER_OF_ROBOT_1))
+    (tmp_path / "two.scenario.toml").write_text(TWO_ROBOTS)
+    _, out, _ = mirotwin("test", tmp_path, "--firmware", image, "--sanitize")
+    assert "may timer  0x0008 reads the halves of timer 0 apart" in out
+    debug = shlex.split(next(line for line in out.splitlines() if " --at " in line))
+    assert debug[-4:-1] == ["--slot", "1", "--at"]
+    assert mirotwin(*debug[1:], "-x", "print/x $pc")[0] == 0
+
+
+def test_conform_puts_findings_into_its_json_and_junit(mirotwin, tmp_path):
+    image = hex_file(tmp_path / "robot.ihx", PUSHES)
+    junit, folder = tmp_path / "j.xml", tmp_path / "left"
+    ask = ("conform", image, "--rule", "P03", "--sanitize")
+    code, out, err = mirotwin(*ask, "--json", "--junit", junit, "--artifacts", folder)
+    assert code == 3
+    document = json.loads(out)
+    assert (document["verdict"], document["exit_code"]) == ("fault", 3)
+    rule, found = document["cases"]
+    assert (rule["rule"], found["rule"], found["verdict"]) == ("P03", "P03", "fault")
+    assert found["group"] == "conform.sanitizer"
+    assert found["lines"][0].startswith("did stack  0x0000 leaves bytes on the stack")
+    assert found["lines"][1] == f"    {found['debug']}"
+    assert found["lines"][1] in err
+    case = ElementTree.parse(junit).findall(".//testcase")[1]
+    assert case.find("failure").get("message") == found["lines"][0]
+    code, out, _ = mirotwin(*shlex.split(found["debug"])[1:], "-x", "print/x $pc")
+    assert (code, "$pc = 0x00" in out) == (0, True)
+    code, out, err = mirotwin(*ask)
+    assert code == 3
+    assert f"    {found['reproduce'].replace(str(folder), 'failed')}\n" in err
+    assert mirotwin(*ask, "--kind", "race")[0] == mirotwin(*ask[:-1])[0]
+    (tmp_path / "allow.txt").write_text("stack  # a test\n")
+    _, _, err = mirotwin(*ask, "--allow", tmp_path / "allow.txt")
+    assert "did stack" not in err
 
 
 POLL = """\
