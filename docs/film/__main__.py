@@ -1,4 +1,4 @@
-"""The recorded terminal of the README: `python -m docs.film` writes `docs/terminal.svg`.
+"""The recorded terminal of docs/start.md: `python -m docs.film` writes `docs/terminal.svg`.
 
 A good run, the same run over a bad radio, whose check fails on purpose, and its recording sent again: the same failure
 at the same tick. The commands are run, and what is drawn is what they print. Times are those of this table, not those

@@ -25,12 +25,11 @@ from properdocs.config.defaults import ProperDocsConfig
 from properdocs.structure.files import File, Files
 from properdocs.structure.pages import Page
 
-sys.path[:0] = [str(Path(__file__).parent)]
-import howtos  # noqa: E402 (beside this file, which properdocs loads by its path)
-import release  # noqa: E402
-import tables  # noqa: E402
-
 ROOT = Path(__file__).parents[2]
+sys.path[:0] = [str(ROOT)]  # properdocs loads this file by its path
+from docs.site import address, howtos, release, tables  # noqa: E402
+from mirotwin.testing.origin import PLACEHOLDER  # noqa: E402
+
 DOCS = "docs"
 HOME = {"README.md": "index.md"}
 LANGUAGES = {".py": "python", ".toml": "toml", ".c": "c", ".h": "c", ".lua": "lua", ".yml": "yaml"}
@@ -180,10 +179,11 @@ def on_page_content(html: str, **_: Any) -> str:
 
 
 def on_page_markdown(markdown: str, page: Page, **_: Any) -> str:
-    """Rewrites the links of one page, and fills in its tables."""
+    """Rewrites the links of one page, and fills in its tables and the address of the repository."""
     here = page.file.src_uri
     if here == howtos.INDEX:
         markdown = howtos.with_first_sentences(markdown, ROOT / origin(here))
+    markdown = markdown.replace(PLACEHOLDER, address.known() or PLACEHOLDER)
     return relinked(tables.filled(markdown), here)
 
 

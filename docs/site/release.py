@@ -1,7 +1,8 @@
 """Which version the site is of, and where its source is.
 
-A site that knows the address of its repository (`repo_url`) leads there. One that does not carries the source itself,
-as an archive of the commit that it was built from. One that was built outside of a repository shows the version alone.
+Where the address of the repository is set (`address.py`), the site leads there. Where not, it carries the source
+itself, as an archive of the commit that it was built from. One that was built outside of a repository shows the version
+alone.
 """
 
 from __future__ import annotations
@@ -9,8 +10,12 @@ from __future__ import annotations
 import subprocess
 import tomllib
 from pathlib import Path
+from typing import TYPE_CHECKING
 
-from properdocs.config.defaults import ProperDocsConfig
+from docs.site import address
+
+if TYPE_CHECKING:
+    from properdocs.config.defaults import ProperDocsConfig
 
 ROOT = Path(__file__).parents[2]
 NAME = "mirotwin"
@@ -31,6 +36,7 @@ def describe(config: ProperDocsConfig) -> None:
     now, built_from = version(), commit()
     config.copyright = f"Mirotwin {now}{f', commit {built_from}' if built_from else ''}. MIT licence."
     config.repo_name = now
+    config.repo_url = address.known()
     config.extra["source"] = "repository" if config.repo_url else "source archive"
     if not config.repo_url and built_from:
         config.repo_url = config.extra["archive"] = f"{NAME}-{now}.tar.gz"

@@ -19,8 +19,10 @@ from miro_exact.bad_input import BadInput, shortened
 PACKAGE = "mirotwin[report]"
 UNKNOWN = re.compile(r"^Write here where .*$", re.MULTILINE)
 """The line of the sample project that stands for it. No requirement: pip fails, and prints the line."""
+PLACEHOLDER = "https://HOST/PATH"
+"""Stands for the address of the repository, also in `[project.urls]` until that is set (`docs/site/address.py`)."""
 _ADDRESS = re.compile(r"(?:(?:git|hg|svn|bzr)\+\w+|https?)://[!-~]+")
-_REMEDY = "give git+https://HOST/PATH@COMMIT, or the path of a wheel, a source archive or a checkout"
+_REMEDY = f"give git+{PLACEHOLDER}@COMMIT, or the path of a wheel, a source archive or a checkout"
 _PLAIN = re.compile(r"[\w+-][\w./+-]*", re.ASCII)
 """A path that pip reads as it stands: without spaces, brackets and the like, and not the project's folder itself."""
 _ARCHIVES = (".whl", ".tar.gz", ".zip")
@@ -56,8 +58,11 @@ def given(source: str, project: Path) -> str:
 def installed(project: Path) -> str | None:
     """The requirement for what is installed here; None where that is not known, or there no more."""
     try:
-        text = metadata.distribution("mirotwin").read_text("direct_url.json")
-        origin = msgspec.json.decode(text or "", type=_DirectUrl)
+        distribution = metadata.distribution("mirotwin")
+        text = distribution.read_text("direct_url.json")
+        if text is None:
+            return _released(distribution)
+        origin = msgspec.json.decode(text, type=_DirectUrl)
     except (metadata.PackageNotFoundError, msgspec.DecodeError):
         return None
     inner = f"#subdirectory={origin.subdirectory}" if origin.subdirectory else ""
@@ -69,6 +74,13 @@ def installed(project: Path) -> str | None:
     else:
         address = f"{origin.url}{inner}"
     return f"{PACKAGE} @ {address}" if _ADDRESS.fullmatch(address) else None
+
+
+def _released(distribution: metadata.Distribution) -> str | None:
+    """The requirement for a version that an index gave: its tag in the repository; None if that has no address."""
+    urls = dict(line.split(", ", 1) for line in distribution.metadata.get_all("Project-URL", ()))
+    address = urls.get("Repository", PLACEHOLDER)
+    return None if address == PLACEHOLDER else f"{PACKAGE} @ git+{address}@v{distribution.version}"
 
 
 def _of_path(path: Path, project: Path) -> str:

@@ -222,8 +222,8 @@ def init(options: InitOptions) -> None:
     test.
 
     requirements.txt says where CI gets Mirotwin: SOURCE, else the git commit, wheel or checkout that the installed one
-    came from; one in the project, or beside it, by its relative path. Where neither is known, it says what to write
-    there, and CI fails with that.
+    came from; one in the project, or beside it, by its relative path; a release from an index by its tag. Where none is
+    known, it says what to write there, and CI fails with that.
     """
     folder, remedy = options.folder, "name a folder that is new or empty"
     found = board_files(options.board) if options.board else project_files(not options.without_firmware)

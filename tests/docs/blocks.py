@@ -41,8 +41,7 @@ ELSEWHERE = {
 }
 """Why a block is not run, by document and the start of its text, where a comment would be in the way of a reader."""
 SLOW_ELSEWHERE = {
-    ("README.md", "mirotwin fuzz"): "30 seconds",
-    ("README.md", "mirotwin examples campaign"): "240 runs",
+    ("README.md", "mirotwin reproduce"): "440 runs",
 }
 """The same for blocks that only `tests.docs.first_use` runs."""
 

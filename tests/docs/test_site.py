@@ -10,6 +10,7 @@ import tomllib
 import pytest
 
 import mirotwin
+from docs.site import address
 from mirotwin.commands import CAMERA, CAMPAIGN, FIRMWARE, SECTIONS
 from tests import children
 from tests.docs import sandbox
@@ -119,6 +120,7 @@ def test_every_page_says_its_version_and_licence(site):
         assert header is None or VERSION in words(header[0]), name
 
 
+@pytest.mark.skipif(bool(address.known()), reason="the address of the repository is set")
 @pytest.mark.skipif(not (ROOT / ".git").exists(), reason="an archive of the source is made of a commit")
 def test_without_an_address_the_source_is_an_archive_beside_the_pages(site):
     with tarfile.open(site / f"mirotwin-{VERSION}.tar.gz") as archive:

@@ -1,4 +1,4 @@
-"""The recorded terminal of the README says what the commands print today."""
+"""The recorded terminal of docs/start.md says what the commands print today."""
 
 import re
 import xml.etree.ElementTree as ElementTree

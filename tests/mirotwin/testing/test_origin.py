@@ -1,6 +1,7 @@
 """Where a project gets Mirotwin from: by PEP 610, or as the user says; never by a mere name."""
 
 import json
+from email.message import Message
 from importlib import metadata
 
 import pytest
@@ -15,10 +16,14 @@ COMMIT = "7921be1537eac1e97bc40179a57f0349c2aee67d"
 
 
 class Installed:
-    """A distribution with this `direct_url.json`."""
+    """A distribution with this `direct_url.json`, and in its metadata this address of the repository."""
 
-    def __init__(self, text):
+    version = "0.3.0"
+
+    def __init__(self, text, repository=origin.PLACEHOLDER):
         self.text = text
+        self.metadata = Message()
+        self.metadata["Project-URL"] = f"Repository, {repository}"
 
     def read_text(self, name):
         return self.text if name == "direct_url.json" else None
@@ -80,6 +85,13 @@ def test_a_path_is_that_of_the_checkout_or_wheel(installed, tmp_path, about):
 )
 def test_what_an_index_gave_what_is_gone_and_what_cannot_be_read_are_not_known(installed, text):
     assert installed(text) is None
+
+
+def test_a_release_from_an_index_is_its_tag_in_the_repository(monkeypatch, tmp_path):
+    found = Installed(None, "https://example.org/a/mirotwin")
+    monkeypatch.setattr(metadata, "distribution", lambda name: found)
+    line = origin.installed(tmp_path)
+    assert line == "mirotwin[report] @ git+https://example.org/a/mirotwin@v0.3.0"
 
 
 def test_a_tree_that_is_not_installed_is_not_known(monkeypatch, tmp_path):
