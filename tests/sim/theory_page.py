@@ -1,11 +1,13 @@
 """Writes measured numbers into docs/theory.md and the radio's README: `python -m tests.sim.theory_page --write`.
 
 The prose is the pages' own. Each of `QUOTES` is a sentence of a page, with `{}` where a number stands, and what
-measures these numbers. Tables stand between marks. Without --write: the lines whose numbers are not those of the runs,
-and exit code 1 if there are some. About a minute.
+measures these numbers. Each of `TABLES` is a CSV file; some columns of one of them stand between marks on the page.
+Without --write: the lines whose numbers are not those of the runs, and exit code 1 if there are some. About a minute.
 """
 
 import argparse
+import csv
+import io
 import re
 import sys
 from collections.abc import Callable
@@ -147,7 +149,7 @@ QUOTES = (
 )
 LAWS = {
     "the paper's law": "yang_kim",
-    "`body_frame`": "body_frame",
+    "body_frame": "body_frame",
     "Kanayama": "kanayama",
     "dynamic feedback": "dynamic_feedback",
 }
@@ -157,9 +159,7 @@ PATHS = ("line", "arc")
 
 def in_the_loop():
     """The table of whole runs."""
-    cells = [loop.row(name, SEEDS) for name in loop.RUNS]
-    names = [re.sub(r"(fig[0-9]+|body_frame|predict)", r"`\1`", row[0]) for row in cells]
-    return [loop.COLUMNS, *([name, *row[1:]] for name, row in zip(names, cells, strict=True))]
+    return [list(loop.COLUMNS), *(list(loop.row(name, SEEDS)) for name in loop.RUNS)]
 
 
 def lifted():
@@ -186,8 +186,28 @@ def from_random_starts(law, kind):
     return [*cells, f"{crossing} of {runs}"]
 
 
-TABLES = {"in the loop": in_the_loop, "law and filter": lifted}
-"""Of docs/theory.md, by the words of their marks."""
+class Table(NamedTuple):
+    """A CSV file, what measures its rows, and those columns that docs/theory.md shows between marks; none: no marks."""
+
+    path: Path
+    rows: Callable[[], list[list[str]]]
+    shown: tuple[int, ...] = ()
+
+    def stored(self):
+        """The rows of the file."""
+        with self.path.open(newline="", encoding="utf-8") as stream:
+            return list(csv.reader(stream))
+
+    def on_page(self, rows):
+        """The rows as the page has them."""
+        return markdown([[row[column] for column in self.shown] for row in rows])
+
+
+TABLES = {
+    "in the loop": Table(ROOT / "tests/sim/theory_loop.csv", in_the_loop),
+    "law and filter": Table(ROOT / "tests/sim/theory_starts.csv", lifted, (0, 1, 2, 4)),
+}
+"""By the words of their marks."""
 
 
 def marked(name):
@@ -201,13 +221,23 @@ def markdown(rows):
     return "\n".join([lines[0], "|---" * len(rows[0]) + "|", *lines[1:]]) + "\n"
 
 
+def csv_text(rows):
+    stream = io.StringIO()
+    csv.writer(stream, lineterminator="\n").writerows(rows)
+    return stream.getvalue()
+
+
 def written(texts, quotes=QUOTES, tables=TABLES):
-    """Pages by their paths, with what is measured now. Raises ValueError for a sentence or a mark that is not there."""
+    """Files by their paths, with what is measured now. Raises ValueError for a sentence or a mark that is not there."""
     texts = dict(texts)
     for quote in quotes:
         texts[quote.page] = quote.written(texts[quote.page])
-    for name, rows in tables.items():
-        new = markdown(rows())
+    for name, table in tables.items():
+        rows = table.rows()
+        texts[table.path] = csv_text(rows)
+        if not table.shown:
+            continue
+        new = table.on_page(rows)
         texts[THEORY], count = marked(name).subn(
             lambda marks, new=new: marks[1] + new + marks[2], texts[THEORY]
         )
@@ -217,7 +247,8 @@ def written(texts, quotes=QUOTES, tables=TABLES):
 
 
 def pages():
-    return {path: path.read_text(encoding="utf-8") for path in (THEORY, RADIO)}
+    paths = (THEORY, RADIO, *(table.path for table in TABLES.values()))
+    return {path: path.read_text(encoding="utf-8") for path in paths}
 
 
 def main():
