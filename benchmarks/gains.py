@@ -1,8 +1,8 @@
 """Many searches for gains of each law, compared: `python -m benchmarks.gains --write docs/gains.md`.
 
 What a search does: `benchmarks.gains_search`. This file chooses the searches, has them made, keeps what is finished in
-a journal, and writes the page and its picture (`benchmarks.gains_page`). The page does not depend on the number of
-processes, on the machine, or on how often the computation was broken off.
+a journal, and writes all tables (benchmarks/gains.json), the page and its picture. The page does not depend on the
+number of processes, on the machine, or on how often the computation was broken off.
 """
 
 from __future__ import annotations

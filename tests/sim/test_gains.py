@@ -14,9 +14,8 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from benchmarks import gains, gains_page, gains_search
+from benchmarks import gains, gains_page, gains_search, gains_tables
 from benchmarks.gains import Journal, jobs_of, key_of
-from benchmarks.gains_page import LAWS, MEASURES, ONE_SET
 from benchmarks.gains_search import (
     CAMERAS,
     FAMILIES,
@@ -34,9 +33,11 @@ from benchmarks.gains_search import (
     Task,
     Tried,
 )
+from benchmarks.gains_tables import LAWS, MEASURES, ONE_SET, tables_of
 from miro_sim.scenario.file import load
 
 PAGE = Path(__file__).parents[2] / "docs/gains.md"
+STORED = gains_tables.stored()
 SMALL = Budget(explored=6, first=4, second=5)
 RUNS = st.lists(st.builds(Outcome, st.booleans(), st.floats(0.0, 3.0)), min_size=3, max_size=3)
 families = pytest.mark.parametrize("family", FAMILIES.values(), ids=lambda family: family.name)
@@ -82,7 +83,7 @@ def results():
 
 def fake_one_set():
     record = Record()
-    return gains_page.one_set(lambda _, tasks: map(record.hold_out, tasks))
+    return gains_tables.one_set(lambda _, tasks: map(record.hold_out, tasks))
 
 
 @families
@@ -165,7 +166,7 @@ def test_the_seeds_that_are_held_out_have_chosen_nothing():
         for repeat in range(gains.REPEATS)
         for seeds in (gains_search.search_seeds, gains_search.check_seeds)
     ]
-    groups = [*chose, set(gains_search.HELD_OUT), set(gains_page.ONE_SET_SEEDS)]
+    groups = [*chose, set(gains_search.HELD_OUT), set(gains_tables.ONE_SET_SEEDS)]
     assert len(set.union(*groups)) == sum(map(len, groups)) - len(gains_search.HELD_OUT)
 
 
@@ -275,9 +276,12 @@ def test_the_page_is_the_same_from_a_journal_and_has_no_place_of_this_machine(tm
         job: msgspec.json.decode(msgspec.json.encode(found), type=Found) for job, found in results().items()
     }
     one = fake_one_set()
-    text = gains_page.page(results(), one)
-    assert gains_page.page(again, one) == text
+    found = tables_of(results(), one)
+    assert tables_of(again, one) == found
+    text = gains_page.page(found)
     assert "/home" not in text
+    gains_tables.store(found, tmp_path / "gains.json")
+    assert gains_tables.stored(tmp_path / "gains.json") == found
     for number, made in enumerate((results(), again)):
         gains_page.draw(made, tmp_path / f"{number}.svg")
     assert (tmp_path / "0.svg").read_bytes() == (tmp_path / "1.svg").read_bytes()
@@ -290,21 +294,25 @@ def rows_of(text, title):
     return [[cell.strip() for cell in line.strip("|").split(" | ")] for line in lines]
 
 
-def page_has_all(text, repeats):
-    """Checks that each section has its rows."""
+def all_rows_are_there(found, repeats):
+    """Checks that each table has its rows, and the page those that it shows."""
     cells = len(LAWS) * len(CAMERAS)
-    assert len(rows_of(text, "Which law is better")) == 1 + len(CAMERAS) + 1 + 6 * len(CAMERAS)
-    assert len(rows_of(text, "How the best sets are distributed")) == 1 + 4 * cells
-    assert f"Median of {repeats} searches" in text
-    assert len(rows_of(text, "How many gain sets settle")) == 1 + cells
-    sets = rows_of(text, "The bounds")[1:]
-    assert [(row[0], row[1]) for row in sets] == [(law, f"{12 * repeats}") for law in LAWS]
-    assert len(rows_of(text, "Some of these sets")) == 1 + 2 * cells
-    assert len(rows_of(text, "One set for Figs. 6, 7 and 9")) == 1 + 9 + 1 + 9
+    assert len(found.rows("pairs")) == 6 * len(CAMERAS)
+    assert len(found.rows("spread")) == 4 * cells
+    assert len(found.rows("drawn")) == cells
+    sets = [(row[0], row[1]) for row in found.rows("bounds")]
+    assert sets == [(law, f"{12 * repeats}") for law in LAWS]
+    assert len(found.rows("sets")) == 2 * cells
+    assert len(found.rows("one set")) == len(found.rows("one set, verdicts")) == 9
+    assert all(len(row) == len(rows[0]) for rows in found.tables.values() for row in rows)
+    text = gains_page.page(found)
+    assert f"medians of {repeats} searches" in text
+    assert len(rows_of(text, "Which law is better")) == 1 + len(CAMERAS) + 1 + 2 * len(CAMERAS)
+    assert len(rows_of(text, "One set for Figs. 6, 7 and 9")) == 1 + len(CAMERAS)
 
 
-def test_a_page_has_all_of_its_rows():
-    page_has_all(gains_page.page(results(), fake_one_set()), 4)
+def test_all_rows_are_there():
+    all_rows_are_there(tables_of(results(), fake_one_set()), 4)
 
 
 def test_ten_searches_of_equal_laws_seldom_decide():
@@ -323,7 +331,7 @@ def test_ten_searches_of_equal_laws_seldom_decide():
     ]
     assert share[0] == pytest.approx(0.043, abs=0.001)
     assert share[1] > 0.05
-    assert pytest.approx(1 - 0.23) == gains_page.DECISIVE
+    assert pytest.approx(1 - 0.23) == gains_tables.DECISIVE
 
 
 def test_more_runs_that_settle_and_smaller_errors_are_better_and_no_error_is_the_largest():
@@ -340,8 +348,8 @@ def test_a_set_on_a_bound_is_counted():
     inside = gains_search.drawn(RETUNED, 0, 0)
     low, high = (RETUNED.bounds[name][end] for name, end in (("length_m", 0), ("alpha_per_s", 1)))
     outermost = {**inside, "alpha_per_s": high, "length_m": gains_search.rounded(low)}
-    assert gains_page.on_bounds(RETUNED.name, outermost) == ["alpha_per_s most", "length_m least"]
-    assert gains_page.on_bounds(RETUNED.name, inside) == []
+    assert gains_tables.on_bounds(RETUNED.name, outermost) == ["alpha_per_s most", "length_m least"]
+    assert gains_tables.on_bounds(RETUNED.name, inside) == []
 
 
 @pytest.mark.parametrize(
@@ -361,20 +369,20 @@ def test_what_cannot_be_searched_is_refused(arguments, capsys):
     assert "Traceback" not in capsys.readouterr().err
 
 
-def test_the_page_that_is_there_has_all_of_its_rows():
-    page_has_all(PAGE.read_text(encoding="utf-8"), gains.REPEATS)
+def test_all_rows_of_the_searches_are_stored_and_the_page_is_made_of_them():
+    all_rows_are_there(STORED, gains.REPEATS)
+    assert gains_page.page(STORED) == PAGE.read_text(encoding="utf-8")
 
 
 def test_the_counts_of_the_verdicts_are_those_of_the_pairs():
-    text = PAGE.read_text(encoding="utf-8")
-    rows = rows_of(text, "Which law is better")
-    counts, pairs = rows[1 : 1 + len(CAMERAS)], rows[2 + len(CAMERAS) :]
+    text, pairs = PAGE.read_text(encoding="utf-8"), STORED.rows("pairs")
+    counts = rows_of(text, "Which law is better")[1 : 1 + len(CAMERAS)]
     won = {measure.name: [0, 0] for measure in MEASURES}
     for camera, *cells in counts:
         for column, (measure, cell) in enumerate(zip(MEASURES, cells, strict=True)):
             texts = [row[3 + column] for row in pairs if row[0] == camera]
             wins = [len([one for one in texts if one.endswith(f": {law}")]) for law in LAWS]
-            assert cell == f"{wins[0]} / {wins[1]} / {len(texts) - sum(wins)}"
+            assert cell == f"{wins[0]} / {wins[1]}"
             won[measure.name] = [sum(both) for both in zip(won[measure.name], wins, strict=True)]
             for one in texts:
                 share, _, winner = one.partition(": ")
@@ -390,46 +398,36 @@ def test_the_picture_has_a_dot_for_each_search_that_settles_somewhere():
     assert len(strips) == len(MEASURES) * len(CAMERAS) * len(LAWS) * len(PATHS) * 2
     dots = [strip.get("d").count("M") for strip in strips]
     assert max(dots) == gains.REPEATS
-    rows = rows_of(PAGE.read_text(encoding="utf-8"), "How the best sets are distributed")
-    spreads = " ".join(text for row in rows for text in row[6:9])
+    spreads = " ".join(text for row in STORED.rows("spread") for text in row[6:9])
     without = [int(number) for number in re.findall(r"(\d+) without", spreads)]
     assert sum(dots) == len(strips) * gains.REPEATS - sum(without)
 
 
 @pytest.mark.slow
 @pytest.mark.parametrize("law", LAWS)
-def test_a_set_of_the_page_does_what_the_page_says(law):
+def test_a_stored_set_does_what_its_row_says(law):
     """White noise, the curve: the cheapest runs."""
-    (row,) = (
-        row
-        for row in rows_of(PAGE.read_text(encoding="utf-8"), "Some of these sets")
-        if row[:3] == ["white noise", law, "curve"]
-    )
+    (row,) = (row for row in STORED.rows("sets") if row[:3] == ["white noise", law, "curve"])
     values = ", ".join(f"{name}={value}" for name, value in re.findall(r"(\w+) ([\d.e-]+)", row[3]))
     family = FAMILIES[law]
     settings = f'network.robot.controller={{law="{family.law}", {family.fixed}, {values}}}'
     runs = gains_search.held_out(
         Task((*CAMERAS["white noise"], settings), PATHS["curve"], gains_search.HELD_OUT)
     )
-    assert row[4] == "; ".join(f"Fig. {figure}: {gains_page.errors(one)}" for figure, one in runs.items())
-
-
-def verdicts_of_page():
-    rows = rows_of(PAGE.read_text(encoding="utf-8"), "One set for Figs. 6, 7 and 9")
-    return {(row[0], row[1]): row[-1] for row in rows if len(row) == 5 and row[0] in CAMERAS}
+    assert row[4] == "; ".join(f"Fig. {figure}: {gains_tables.errors(one)}" for figure, one in runs.items())
 
 
 @pytest.mark.parametrize(
     ("cameras", "figures", "seeds"),
     [
         (["white noise"], (6,), range(8)),
-        pytest.param(list(CAMERAS), gains_page.ONE_SET_FIGURES, range(20), marks=pytest.mark.slow),
+        pytest.param(list(CAMERAS), gains_tables.ONE_SET_FIGURES, range(20), marks=pytest.mark.slow),
     ],
     ids=("some runs", "20 seeds"),
 )
 def test_the_verdicts_on_the_one_set_are_those_of_fewer_seeds(cameras, figures, seeds):
-    found = gains_page.one_verdicts(gains_page.one_set(map, cameras, figures, seeds))
+    found = gains_tables.one_verdicts(gains_tables.one_set(map, cameras, figures, seeds))
     assert len(found) == 3 * len(cameras)
     assert {key: better for key, (_, better) in found.items()} == {
-        key: better for key, better in verdicts_of_page().items() if key[0] in cameras
+        (row[0], row[1]): row[-1] for row in STORED.rows("one set, verdicts") if row[0] in cameras
     }
