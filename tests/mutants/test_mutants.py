@@ -13,7 +13,7 @@ from miro_robot.firmware import image_path
 from tests import children
 from tests.mutants.build import build, shipped
 from tests.mutants.c_tokens import tokens, words
-from tests.mutants.document import BEGIN, END, PAGE, render, replaced
+from tests.mutants.document import BEGIN, END, PAGE, render, replaced, rows_of, tables
 from tests.mutants.draw import COUNT, SEED, SOURCE, drawn, mutants_of, source_files
 from tests.mutants.operators import OPERATORS, changes
 from tests.mutants.planted import PLANTED
@@ -323,25 +323,49 @@ def test_every_survivor_of_the_table_is_a_mutant_of_the_draw_and_its_reason_a_se
         assert one.because.endswith(".")
 
 
-def test_the_page_shows_each_fate_and_can_be_written_again():
-    alive = of_draw(50, "alive")
-    score = Score(7, ("P01", "P02"), 2.25, (*KILLED, *OTHERS, alive))
-    part = render(score, {alive.id: EQUIVALENT}, 2000)
-    assert "Seed 7: 22 of 2000 mutants. **Killed 19 of the 19 that do not conform, 100.0 %**" in part
-    assert "| constant | 22 | 1 | 1 | 19 | 1 | 0 | 0 | 0 |\n" in part
-    assert "| `a.c:50:1:constant:0` | `1 -> 0` | equivalent | It is the same. |\n" in part
-    assert f"| never stops | {PLANTED['never stops'].breaks} | P02 |\n" in part
-    assert "| P01 | 19 | 19 | 1 |\n" in part
+def test_the_page_and_the_tables_show_each_fate_and_can_be_written_again():
+    alive, missed = of_draw(50, "alive"), of_draw(51, "alive")
+    score = Score(7, ("P01", "P02"), 2.25, (*KILLED, *OTHERS, alive, missed))
+    known = {alive.id: EQUIVALENT, missed.id: MISSING}
+    part = render(score, known, 2000)
+    assert "Seed 7: 23 of 2000 mutants. **Killed 19 of the 20 that do not conform, 95.0 %**" in part
+    assert "1 does not compile, 1 same bytes, 19 killed, 1 equivalent, 0 allowed" in part
+    assert "* `a.c:51:1:constant:0`, `1 -> 0`, missing: No rule looks there.\n" in part
+    assert alive.id not in part
+    written = tables(score, known)
+    assert "\nconstant,23,1,1,19,1,0,0,1\n" in written["operators.csv"]
+    assert "\na.c:50:1:constant:0,1 -> 0,equivalent\n" in written["alive.csv"]
+    assert f"\nnever stops,{PLANTED['never stops'].breaks},P02\n" in written["planted.csv"]
+    assert "\nP01,19,19,1\n" in written["rules.csv"]
     page = PAGE.read_text("utf-8")
     assert replaced(replaced(page, part), part) == replaced(page, part) != page
     assert page.split(BEGIN)[1].split(END)[0].startswith("Seed ")
 
 
-def test_every_survivor_stands_on_the_page_with_its_reason():
+def test_every_survivor_stands_in_the_table_and_those_that_do_not_conform_on_the_page_with_their_reason():
     page = PAGE.read_text("utf-8")
-    for name, one in survivors().items():
-        assert f"| `{name.replace('|', chr(92) + '|')}` |" in page
-        assert one.because in page
+    known = survivors()
+    assert {row["mutant"]: row["verdict"] for row in rows_of("alive.csv")} == {
+        name: one.verdict for name, one in known.items()
+    }
+    for name, one in known.items():
+        assert (f"* `{name}`, " in page) == (one.verdict in ("unreachable", "missing"))
+        assert one.conforms or one.because in page
+
+
+def test_the_figures_on_the_page_are_those_of_the_tables():
+    page = PAGE.read_text("utf-8")
+    (total,) = [row for row in rows_of("operators.csv") if row["operator"] == "all"]
+    counts = [f"{total[fate]} {fate}" for fate in list(total)[2:]]
+    assert f"All mutants: {', '.join(counts)}." in page
+    assert (
+        f"Seed {SEED}: {total['drawn']} of {len(MUTANTS)} mutants. **Killed {total['killed']} of the " in page
+    )
+    rules = rows_of("rules.csv")
+    alone = len([row for row in rules if row["it alone"] != "0"])
+    assert f"Each of the {len(rules)} rules" in page
+    assert f"{alone} of them kill a mutant alone" in page
+    assert "0" not in {row["kills"] for row in rules}
 
 
 def test_rules_that_are_tried_again_replace_their_old_verdict_alone():
