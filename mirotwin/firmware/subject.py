@@ -12,7 +12,7 @@ from miro_exact.bad_input import BadInput
 from miro_exact.plugins import use_one_of
 from miro_robot.inspect.watcher import Watcher
 from miro_sim.radio.downlink import TransmissionError
-from miro_sim.scenario.board_scenario import AnyText, BoardText, is_board, load_any
+from miro_sim.scenario.board_scenario import AnyText, is_board, load_any
 from miro_sim.scenario.file import builtin_names
 from miro_sim.world.world import World
 from mirotwin.firmware.bare_options import (
@@ -41,7 +41,6 @@ from mirotwin.shell.options import (
     TO,
     Engine,
     plain_parameters,
-    refuse_steps,
 )
 from mirotwin.shell.plugin_files import PluginFiles
 from mirotwin.shell.program import complain, report_lines, tell_notes
@@ -208,11 +207,9 @@ def _robot_run(options: SubjectOptions) -> InspectedRun:
 
 
 def _by_steps(spec: RunSpec, text: AnyText) -> RunSpec:
-    """The run of a board that its steps drive, as what they sent and did. Raises BadInput for robots."""
+    """The run of a scenario with steps, as what they sent and did. Raises BadInput."""
     from mirotwin.verify.steps.reading import steps_in  # `fw run` starts without
 
-    if not isinstance(text, BoardText):
-        refuse_steps(text.scenario, text.origin)
     with ProgressBar("doing its steps", spec.scenario.end_tick) as bar:
         return scripted(msgspec.structs.replace(spec, steps=steps_in(text)), bar.to)
 

@@ -304,9 +304,11 @@ class Run:
 
 
 def scripted(spec: RunSpec, progress: Callable[[int], object] = lambda tick: None) -> RunSpec:
-    """The run of a board with steps, as what they sent and did: it can be stopped anywhere then."""
+    """A run with steps, as what they sent and did: it can be stopped anywhere then."""
     run = Run.traced(spec).play(progress)
-    scenario = msgspec.structs.replace(spec.scenario, bit_ticks=run.world.bit_ticks)
+    scenario = spec.scenario
+    if isinstance(scenario, BoardScenario):
+        scenario = msgspec.structs.replace(scenario, bit_ticks=run.world.bit_ticks)
     return msgspec.structs.replace(spec, scenario=scenario, steps=(), script=run.script())
 
 

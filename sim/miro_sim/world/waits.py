@@ -139,10 +139,12 @@ class Waits:
         inspectors = self._inspectors()
         for inspector in inspectors:
             inspector.pause()
-        end_tick, reached = self._end_of_piece(watch, before, until_tick)
-        if inspectors:
+        try:
+            end_tick, reached = self._end_of_piece(watch, before, until_tick)
+        finally:  # a part may raise
             for inspector in inspectors:
                 inspector.resume()
+        if inspectors:
             self._again_to(watch, before, end_tick)
         self.backlog += reached
 

@@ -233,6 +233,32 @@ def test_what_a_wait_runs_twice_is_seen_once(mirotwin, tmp_path):
     assert mirotwin("test", tmp_path / "poll.scenario.toml", "--sanitize") == plain
 
 
+UNREAD = """
+    MOV RCAP2H,#0FFh
+    MOV RCAP2L,#0B2h
+    MOV T2CON,#34h
+    MOV SCON,#50h
+wait:
+    JNB RI,wait
+    CLR RI
+    SJMP wait
+"""
+
+
+def test_fw_sanitize_plays_the_steps_of_a_robot(mirotwin, tmp_path):
+    """What it finds needs the characters that a step sends."""
+    image = hex_file(tmp_path / "robot.ihx", assemble(UNREAD))
+    scenario = tmp_path / "poll.scenario.toml"
+    scenario.write_text(POLL)
+    _, in_test, _ = mirotwin("test", scenario, "--firmware", image, "--sanitize")
+    code, out, _ = mirotwin("fw", "sanitize", scenario, "--firmware", image)
+    found, debug = out.splitlines()
+    assert code == 3
+    assert found.startswith("did uart  0x000f clears RI, and SBUF is not read")
+    assert f"    {found}\n    {debug}\n" in in_test
+    assert mirotwin(*shlex.split(debug)[1:], "-x", "print/x $pc")[1].endswith("$pc = 0x0c\n")
+
+
 @pytest.mark.slow
 @pytest.mark.parametrize("scenario", sorted(EXAMPLES.glob("*/*.scenario.toml")), ids=lambda path: path.stem)
 def test_tests_of_the_example_boards_are_silent(mirotwin, scenario):

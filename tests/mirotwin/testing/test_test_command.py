@@ -220,10 +220,8 @@ def test_run_does_steps_too_and_its_recording_replays(mirotwin, folder):
     assert "--record full does not go with the steps of hil/a.scenario.toml" in err
 
 
-@pytest.mark.parametrize("command", [["fw", "trace"], ["camera", "look"]])
-def test_commands_that_would_leave_steps_out_say_so(mirotwin, folder, command):
-    time = ["--at", "0.1s"] if command == ["camera", "look"] else ["--to", "1ms"]
-    err = mirotwin.ends(2, *command, "hil/a.scenario.toml", *time)
+def test_a_command_that_would_leave_steps_out_says_so(mirotwin, folder):
+    err = mirotwin.ends(2, "camera", "look", "hil/a.scenario.toml", "--at", "0.1s")
     assert "has 3 steps, which only `mirotwin run` and `mirotwin test` do; run it, and give the run" in err
 
 

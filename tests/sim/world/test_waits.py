@@ -8,9 +8,10 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from miro_exact.clock import LM629_SAMPLE_TICKS, ticks
+from miro_robot.inspect.watcher import Watcher, attach
 from miro_robot.inspect.waveform import Waveform
 from miro_sim.world import conditions as wait
-from miro_sim.world.waits import WaitExpired
+from miro_sim.world.waits import WaitExpired, Waits
 from tests.robot.inspect import reading
 from tests.sim.world.rig import PERIOD, fig6, two_networks
 
@@ -255,3 +256,25 @@ def uncut_end():
     world = two_networks()
     world.run_to(5 * PERIOD)
     return 5 * PERIOD, world.digest
+
+
+class Seen(Watcher):
+    """How many instructions it was told of."""
+
+    count = 0
+
+    def executed(self, cpu, pc, start):
+        self.count += 1
+
+
+def test_a_watcher_goes_on_where_a_wait_broke_down(monkeypatch):
+    """As a part's exception ends it."""
+    world, watcher = fig6(), Seen()
+    attach(world.devices[0].board.cpu, watcher).once.append(watcher)
+    with monkeypatch.context() as patched:
+        patched.setattr(Waits, "_end_of_piece", lambda *_: 1 // 0)
+        with pytest.raises(ZeroDivisionError):
+            world.run_until(wait.Sent(), within=PERIOD)
+    assert watcher.count == 0
+    world.run_to(world.tick + PERIOD)
+    assert watcher.count > 0
