@@ -2,7 +2,7 @@
 
     python -m benchmarks.fuzz_time [--limit 60] [--seeds 3] [--engines afl hypothesis] [--only NAME ..]
     python -m benchmarks.fuzz_time --planted [--limit 20]     # the other table: mistakes of tests.mutants.planted
-    python -m benchmarks.fuzz_time --write                    # the tables of docs/fuzzing.md, from what was measured
+    python -m benchmarks.fuzz_time --write                    # fuzz_time*.csv and docs/fuzzing.md
 
 Trials run one after the other, one process of the engine each. Their results stand in `build/mutants/fuzz_time.json`;
 what stands there for the same image, and was found or not within that limit, is not measured again without `--again`.
@@ -16,7 +16,7 @@ from collections.abc import Iterator, Mapping
 
 import msgspec
 
-from benchmarks.fuzz_time_tables import PAGE, render, replaced
+from benchmarks.fuzz_time_tables import EASY, HARD, PAGE, hard_table, planted_table, render, replaced, rows_of
 from benchmarks.fuzz_time_trial import ENGINES, Trial, Wanted, measured
 from tests.mutants.build import CACHE, build
 from tests.mutants.draw import source_files
@@ -82,9 +82,14 @@ def main() -> None:
     asked = parser.parse_args()
     if not asked.write:
         _measure(asked)
-    print(render(results().trials.values()))
+    trials = results().trials.values()
+    hard, planted = hard_table(trials), planted_table(trials)
+    print(hard, planted, sep="\n")
     if asked.write:
-        PAGE.write_text(replaced(PAGE.read_text("utf-8"), render(results().trials.values())), "utf-8")
+        HARD.write_text(hard, "utf-8")
+        EASY.write_text(planted, "utf-8")
+        part = render(rows_of(HARD), rows_of(EASY))
+        PAGE.write_text(replaced(PAGE.read_text("utf-8"), part), "utf-8")
 
 
 def _measure(asked: argparse.Namespace) -> None:

@@ -1,14 +1,29 @@
-"""The tables of docs/fuzzing.md: what a trial becomes, and that the page has each mistake as it is now."""
+"""The tables of fuzz_time and docs/fuzzing.md: what a trial becomes, and that they have each mistake as it is now."""
+
+import csv
+import io
 
 import msgspec
 import pytest
 
-from benchmarks.fuzz_time_tables import BEGIN, END, PAGE, render, replaced
+from benchmarks.fuzz_time_tables import (
+    BEGIN,
+    EASY,
+    END,
+    HARD,
+    PAGE,
+    hard_table,
+    planted_table,
+    render,
+    replaced,
+    rows_of,
+)
 from benchmarks.fuzz_time_trial import Trial, Wanted, measured
 from benchmarks.processor_time import of_descendants
 from tests import children
 from tests.mutants.build import shipped
 from tests.mutants.for_fuzzing import FOR_FUZZING
+from tests.mutants.planted import PLANTED
 from tests.mutants.sdcc import needs_sdcc
 
 NAME = "takes a ninth step"
@@ -20,8 +35,12 @@ def trial(engine, seed, found_s, checks=(), seeded=False):
 
 
 def row(*trials):
-    lines = [line for line in render(trials).splitlines() if line.startswith(f"| {NAME} ")]
-    return [cell.strip() for cell in lines[0].split("|")[4:-1]]
+    (cells,) = [cells for cells in csv.reader(io.StringIO(hard_table(trials))) if cells[0] == NAME]
+    return cells[3:]
+
+
+def rows(text):
+    return list(csv.DictReader(io.StringIO(text)))
 
 
 def test_a_cell_has_one_number_a_seed_in_their_order():
@@ -35,7 +54,6 @@ def test_a_cell_has_one_number_a_seed_in_their_order():
 def test_a_find_by_another_check_is_marked():
     found = (trial("afl", 1, 3.0, ("no_fault",)),)
     assert row(*found) == ["3.0*"]
-    assert "* is not by the check that the mistake names" in render(found)
 
 
 def test_what_a_seed_shows_is_said_once():
@@ -52,16 +70,16 @@ def test_a_find_answers_for_any_limit_and_none_for_shorter_ones_of_the_same_imag
 
 def test_firmware_that_does_not_come_up_is_told_with_what_was_said_of_it():
     wanted = Wanted("planted", "pushes for ever", "", "afl", 1, 15.0, "folder")
-    table = render([Trial(wanted, 0.0, 0.0, refused="it comes up with a fault")])
-    assert "| pushes for ever | not fuzzed | it comes up with a fault |" in table
+    table = planted_table([Trial(wanted, 0.0, 0.0, refused="it comes up with a fault")])
+    assert "\npushes for ever,not fuzzed,it comes up with a fault\n" in table
 
 
 def test_what_was_found_is_counted_seed_by_seed():
-    table = render([trial("afl", 1, None), trial("afl", 2, 3.0), trial("afl", 3, 4.0)])
-    assert "| found |  |  | 0 1 1 of 1 |" in table
+    table = hard_table([trial("afl", 1, None), trial("afl", 2, 3.0), trial("afl", 3, 4.0)])
+    assert "\nfound,,,0 1 1 of 1\n" in table
     other = msgspec.structs.replace(trial("afl", 1, 3.0).wanted, mistake="waits for standstill")
-    table = render([trial("afl", 1, 3.0), trial("afl", 2, None), Trial(other, None, 70.0)])
-    assert "| found |  |  | 1 of 2, 0 of 1 |" in table
+    table = hard_table([trial("afl", 1, 3.0), trial("afl", 2, None), Trial(other, None, 70.0)])
+    assert '\nfound,,,"1 of 2, 0 of 1"\n' in table
 
 
 def test_planted_mistakes_stand_beside_each_other_by_engine():
@@ -73,20 +91,45 @@ def test_planted_mistakes_stand_beside_each_other_by_engine():
 
     wanted = Wanted("planted", "pushes for ever", "", "afl", 1, 20.0, "folder")
     refused = Trial(wanted, 0.0, 0.0, refused="it comes up with a fault")
-    table = render([planted("afl", 1, 1.0), planted("afl", 2, None), planted("hypothesis", 1, None), refused])
-    assert "| planted mistake | AFL++ | Hypothesis | checks that failed |" in table
-    assert "| swaps the wheels | 1.0 >20 | >20 | `no_fault` |" in table
-    assert "| found | 1 0 of 1 | 0 of 1 |  |" in table
+    trials = [planted("afl", 1, 1.0), planted("afl", 2, None), planted("hypothesis", 1, None), refused]
+    table = planted_table(trials)
+    assert table.startswith("mistake,AFL++,Hypothesis,checks that failed\n")
+    assert "\nswaps the wheels,1.0 >20,>20,no_fault\n" in table
+    assert "\nfound,1 0 of 1,0 of 1,\n" in table
+    part = render([], rows(table))
+    assert (
+        "The 2 planted mistakes: AFL++ found 1 0 of 1, Hypothesis found 0 of 1; 1 come up with a fault"
+        in part
+    )
+    assert "Never found" not in part
+    assert "Never found: swaps the wheels.\n" in render([], rows(planted_table(trials[1:])))
+
+
+def test_the_page_shows_the_rare_mistakes_that_some_seed_missed_alone():
+    missed = [trial("afl", 1, 3.0), trial("afl", 2, None)]
+    needs = FOR_FUZZING[NAME].needs
+    assert f"| {NAME} | {needs} | 3.0* >60 |\n" in render(rows(hard_table(missed)), [])
+    assert NAME not in render(rows(hard_table(missed[:1])), [])
+    assert render(rows(hard_table([])), rows(planted_table([]))) == ""
 
 
 def test_another_part_is_put_between_the_marks():
     assert replaced(f"a\n{BEGIN}old\n{END}b\n", "new\n") == f"a\n{BEGIN}new\n{END}b\n"
 
 
-def test_the_page_has_every_mistake_with_what_it_needs_and_its_check():
-    page = PAGE.read_text("utf-8")
-    for one in FOR_FUZZING.values():
-        assert f"| {one.name} | {one.needs} | `{one.check}` |" in page
+def test_the_tables_have_every_mistake_with_what_it_needs_and_its_check():
+    hard, planted = rows_of(HARD), rows_of(EASY)
+    assert [(row["mistake"], row["needs"], row["check"]) for row in hard[:-1]] == [
+        (one.name, one.needs, one.check) for one in FOR_FUZZING.values()
+    ]
+    assert [row["mistake"] for row in planted] == [*PLANTED, "found"]
+
+
+def test_the_page_says_what_the_tables_have():
+    before, rest = PAGE.read_text("utf-8").split(BEGIN)
+    part = rest.split(END)[0]
+    assert "`*` found by another check than the mistake names" in before
+    assert part == render(rows_of(HARD), rows_of(EASY))
 
 
 def test_the_processor_time_of_a_child_is_counted_while_it_lives():
