@@ -12,6 +12,7 @@ from textwrap import wrap
 from benchmarks.gains_search import CAMERAS, PAPER, PATHS, RETUNED
 from benchmarks.gains_tables import (
     COMPARISONS,
+    DATA,
     DECISIVE,
     LAWS,
     MEASURES,
@@ -20,14 +21,12 @@ from benchmarks.gains_tables import (
     Cell,
     Measure,
     Results,
-    Row,
-    Stored,
     cells_of,
     one_set,
     span,
-    store,
     tables_of,
 )
+from mirotwin.campaign.reproduce.stored_tables import Row, StoredTables
 from mirotwin.report.svg import Drawing, Panel, PanelBox, Stroke
 
 
@@ -38,7 +37,7 @@ def write(results: Results, executor: Executor, path: Path | None) -> None:
     if path is None:
         print(text, end="")
     else:
-        store(found)
+        found.write(DATA)
         path.write_text(text, encoding="utf-8")
         draw(results, path.with_suffix(".svg"))
 
@@ -95,9 +94,9 @@ The paper's law with its shipped gains / epsilon-tracking with this set, medians
 """
 
 
-def page(found: Stored) -> str:
+def page(found: StoredTables) -> str:
     """The whole text."""
-    searched, pairs = found.searched, found.rows("pairs")
+    searched, pairs = found.about, found.rows("pairs")
     words = {
         "verdict": verdict(pairs),
         "repeats": searched["searches"],
@@ -180,14 +179,12 @@ def _verdict_lines(pairs: Sequence[Row]) -> Iterator[str]:
         yield f"| {camera} | {' | '.join(f'{one[PAPER.name]} / {one[RETUNED.name]}' for one in won)} |"
 
 
-def _median_lines(found: Stored) -> Iterator[str]:
+def _median_lines(found: StoredTables) -> Iterator[str]:
     """Of each camera and path at the end: both laws' medians."""
     names = found.tables["spread"][0]
     columns = [names.index(measure.name) for measure in MEASURES]
     yield from table("camera", "path", *(names[column] for column in columns))
-    end = [
-        row for row in found.rows("spread") if row[names.index("sets")] == found.searched["sets at the end"]
-    ]
+    end = [row for row in found.rows("spread") if row[names.index("sets")] == found.about["sets at the end"]]
     for camera, path in dict.fromkeys((row[0], row[2]) for row in end):
         both = [row for row in end if (row[0], row[2]) == (camera, path)]
         cells = [" / ".join(row[column].partition(" ")[0] for row in both) for column in columns]
@@ -195,7 +192,7 @@ def _median_lines(found: Stored) -> Iterator[str]:
         yield f"| {camera} | {path} | {cells[0]} of {settled} | {' | '.join(cells[1:])} |"
 
 
-def _one_set_lines(found: Stored) -> Iterator[str]:
+def _one_set_lines(found: StoredTables) -> Iterator[str]:
     rows = found.rows("one set, verdicts")
     measures = list(dict.fromkeys(row[1] for row in rows))
     yield from table("camera", *measures)

@@ -11,8 +11,6 @@ from pathlib import Path
 from statistics import median
 from typing import NamedTuple
 
-import msgspec
-
 from benchmarks.gains_search import (
     CAMERAS,
     FAMILIES,
@@ -34,9 +32,9 @@ from benchmarks.gains_search import (
 )
 from mirotwin.campaign.reproduce.claims import number as shown
 from mirotwin.campaign.reproduce.plan import LINE, SETTINGS
+from mirotwin.campaign.reproduce.stored_tables import Row, StoredTables
 
 DATA = Path(__file__).with_name("gains.json")
-Row = list[str]
 PAIR = "the paper's law beside epsilon-tracking"
 Results = Mapping[Job, Found]
 LAWS = tuple(FAMILIES)
@@ -183,10 +181,9 @@ def duels_of(results: Results) -> list[Duel]:
     return found
 
 
-class Stored(msgspec.Struct, frozen=True):
-    """What the searches came to. Each table has its head.
+def tables_of(results: Results, one: Runs) -> StoredTables:
+    """All tables. `one`: the runs of the gain set that is a case of its own.
 
-    searched   how it was searched
     pairs      in how many of 100 pairs the search of epsilon-tracking beats that of the paper's law (a search that
                settles nowhere is beaten; equals count half), and the law that wins
     spread     median of the searches (least to most); by start: the median of the runs that settle
@@ -196,31 +193,6 @@ class Stored(msgspec.Struct, frozen=True):
                its gains as keys of `[network.robot.controller]`; runs that settle, error in truth / camera error in cm
     one set    the same of a set for Figs. 6, 7 and 9; `one set, verdicts`: whose medians are the smaller ones
     """
-
-    searched: dict[str, str]
-    tables: dict[str, list[Row]]
-
-    def rows(self, name: str) -> list[Row]:
-        """The rows of a table, without its head."""
-        return self.tables[name][1:]
-
-
-def stored(path: Path = DATA) -> Stored:
-    return msgspec.json.decode(path.read_bytes(), type=Stored)
-
-
-def store(found: Stored, path: Path = DATA) -> None:
-    """A line for each row, so that a change shows which."""
-    tables = ",\n".join(
-        f'"{name}":[\n' + ",\n".join(msgspec.json.encode(row).decode() for row in rows) + "\n]"
-        for name, rows in found.tables.items()
-    )
-    text = f'{{"searched":{msgspec.json.encode(found.searched).decode()},\n"tables":{{\n{tables}\n}}}}\n'
-    path.write_text(text, encoding="utf-8")
-
-
-def tables_of(results: Results, one: Runs) -> Stored:
-    """All tables. `one`: the runs of the gain set that is a case of its own."""
     jobs = list(results)
     budget, repeats = jobs[0].budget, 1 + max(job.repeat for job in jobs)
     first, second = budget.sets
@@ -244,7 +216,7 @@ def tables_of(results: Results, one: Runs) -> Stored:
         "one set": _one_set_rows(one),
         "one set, verdicts": _one_set_verdict_rows(one),
     }
-    return Stored(searched, {name: list(lines) for name, lines in rows.items()})
+    return StoredTables(searched, {name: list(lines) for name, lines in rows.items()})
 
 
 def span(seeds: range) -> str:

@@ -41,11 +41,12 @@ def _run(module: str, *arguments: str) -> None:
 
 
 def _reproduce() -> None:
-    """The page and its pictures; the recordings stay out of the tree."""
+    """The page, its tables and its pictures; rows and recordings stay out of the tree."""
     with TemporaryDirectory() as folder:
         _run("mirotwin", "reproduce", "--out", folder)
         made = Path(folder)
-        for path in (made / REPRODUCTION, *made.glob("reproduction/*.svg")):
+        names = "reproduction/tables.json", "reproduction/*.svg"
+        for path in (made / REPRODUCTION, *(path for name in names for path in made.glob(name))):
             copyfile(path, DOCS / path.relative_to(made))
 
 

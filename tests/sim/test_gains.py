@@ -35,9 +35,10 @@ from benchmarks.gains_search import (
 )
 from benchmarks.gains_tables import LAWS, MEASURES, ONE_SET, tables_of
 from miro_sim.scenario.file import load
+from mirotwin.campaign.reproduce.stored_tables import read
 
 PAGE = Path(__file__).parents[2] / "docs/gains.md"
-STORED = gains_tables.stored()
+STORED = read(gains_tables.DATA)
 SMALL = Budget(explored=6, first=4, second=5)
 RUNS = st.lists(st.builds(Outcome, st.booleans(), st.floats(0.0, 3.0)), min_size=3, max_size=3)
 families = pytest.mark.parametrize("family", FAMILIES.values(), ids=lambda family: family.name)
@@ -280,8 +281,8 @@ def test_the_page_is_the_same_from_a_journal_and_has_no_place_of_this_machine(tm
     assert tables_of(again, one) == found
     text = gains_page.page(found)
     assert "/home" not in text
-    gains_tables.store(found, tmp_path / "gains.json")
-    assert gains_tables.stored(tmp_path / "gains.json") == found
+    found.write(tmp_path / "gains.json")
+    assert read(tmp_path / "gains.json") == found
     for number, made in enumerate((results(), again)):
         gains_page.draw(made, tmp_path / f"{number}.svg")
     assert (tmp_path / "0.svg").read_bytes() == (tmp_path / "1.svg").read_bytes()

@@ -9,6 +9,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 from functools import partial
+from typing import NamedTuple
 
 import msgspec
 
@@ -39,17 +40,34 @@ BOUND_CM = 2.40
 """The paper's own measurement error."""
 
 
-Judged = tuple[str, str]
-"""The measured values as text, and the verdict."""
+FEW = 4
+"""So many cases of a claim are listed one by one on the page."""
+
+
+class Judged(NamedTuple):
+    """The measured values as text, those of them that decide, and the verdict."""
+
+    measured: str
+    deciding: str
+    verdict: str
+
+
+class Case(NamedTuple):
+    """A case of a claim, and whether the claim holds in it; None: not judged."""
+
+    name: str
+    measured: str
+    holds: bool | None
 
 
 class ClaimResult(msgspec.Struct, frozen=True):
-    """A claim, its criterion, what was measured, and what follows."""
+    """A claim, its criterion, what was measured, what of it decides, and what follows."""
 
     figure: str
     claim: str
     criterion: str
     measured: str
+    deciding: str
     verdict: str
 
 
@@ -63,7 +81,7 @@ def _converges(rows: Sequence[RunRow]) -> str:
 
 def _error(rows: Sequence[RunRow]) -> str:
     settled_rows = settled(rows)
-    return f"{number(middle(settled_rows, 'rms_position_cm'))} cm; {len(settled_rows)} of {len(rows)} runs"
+    return f"{number(middle(settled_rows, 'rms_position_cm'))} cm, {len(settled_rows)} of {len(rows)} runs"
 
 
 def _of_cases(cases: Sequence[bool | None], some: str = PART) -> str:
@@ -73,18 +91,43 @@ def _of_cases(cases: Sequence[bool | None], some: str = PART) -> str:
     return HOLDS if all(cases) else some if any(cases) else NOT
 
 
+def judged(cases: Sequence[Case]) -> Judged:
+    """A claim that is to hold in all cases. Of many cases only few decide."""
+
+    def texts(some: Sequence[Case]) -> str:
+        return "; ".join(f"{case.name}: {case.measured}" for case in some)
+
+    verdict = _of_cases([case.holds for case in cases])
+    if len(cases) <= FEW:
+        return Judged(texts(cases), texts(cases), verdict)
+    yes, no = ([case for case in cases if case.holds is holds] for holds in (True, False))
+    deciding = f"{len(yes)} of {len(cases)} cases"
+    if others := len(cases) - len(yes) - len(no):
+        deciding += f", {others} not judged"
+    if 0 < len(no) < FEW:
+        deciding += f"; not {texts(no)}"
+    elif 0 < len(yes) < FEW:
+        deciding += f"; {texts(yes)}"
+    return Judged(texts(cases), deciding, verdict)
+
+
+def _plain(measured: str, verdict: str) -> Judged:
+    """All that was measured decides."""
+    return Judged(measured, measured, verdict)
+
+
 def _approach(table: Table, figure: int) -> Judged:
     rows = rows_of(table, figure, PAPER)
-    return _error(rows), _converges(rows)
+    return _plain(_error(rows), _converges(rows))
 
 
 def _robust(table: Table, disturbances: Sequence[str]) -> Judged:
-    measured, verdicts = [], []
+    cases = []
     for disturbance in disturbances:
-        groups = [rows_of(table, figure, PAPER, "", disturbance) for figure in (6, 7, 8)]
-        verdicts += [_converges(rows) for rows in groups]
-        measured.append(f"{disturbance}: {', '.join(_error(rows) for rows in groups)}")
-    return "; ".join(measured), _of_cases([one == HOLDS for one in verdicts])
+        for figure in (6, 7, 8):
+            rows = rows_of(table, figure, PAPER, "", disturbance)
+            cases.append(Case(f"{disturbance}, Fig. {figure}", _error(rows), _converges(rows) == HOLDS))
+    return judged(cases)
 
 
 def _asymptotic(table: Table) -> Judged:
@@ -95,7 +138,7 @@ def _asymptotic(table: Table) -> Judged:
     small = [None if seen is None or better is None else seen <= 2.0 * better for seen, better in pairs]
     ours, theirs = (", ".join(map(number, values)) for values in zip(*pairs, strict=True))
     measured = f"{ours} cm as the camera sees it, where the improved chain leaves {theirs} cm"
-    return measured, _of_cases(small, NOT)
+    return _plain(measured, _of_cases(small, NOT))
 
 
 def _heading(table: Table) -> Judged:
@@ -106,14 +149,14 @@ def _heading(table: Table) -> Judged:
         for heading, rows in zip(headings, groups, strict=True)
     ]
     small = [None if heading is None else heading <= 4.83 for heading in headings]
-    return f"{', '.join(measured)} degrees", _of_cases(small, NOT)
+    return _plain(f"{', '.join(measured)} degrees", _of_cases(small, NOT))
 
 
 def _motion(table: Table, figure: int) -> Judged:
     rows = rows_of(table, figure, PAPER)
     moved = sum(row.reversals > 0 for row in rows)
     verdict = HOLDS if rows and moved >= MOST * len(rows) else PART if moved else NOT
-    return f"{moved} of {len(rows)} runs", verdict
+    return _plain(f"{moved} of {len(rows)} runs", verdict)
 
 
 def _assumption_3(table: Table) -> Judged:
@@ -123,28 +166,30 @@ def _assumption_3(table: Table) -> Judged:
     measured = (
         f"{crossed} of {len(rows)} runs cross it; the median run spends {frames} frames within 0.1 rad of it"
     )
-    return measured, HOLDS if rows and not crossed else NOT
+    return _plain(measured, HOLDS if rows and not crossed else NOT)
 
 
 def _epsilon_fails(table: Table) -> Judged:
-    measured, failing = [], []
+    cases = []
     for controller in EPSILONS:
         rows = [row for figure in (9, 10) for row in rows_of(table, figure, controller)]
         never = never_settled(rows)
-        failing.append(bool(rows) and never >= MOST * len(rows))
-        measured.append(f"{_short(controller)}: {never} of {len(rows)} runs never settle")
-    return "; ".join(measured), _of_cases(failing)
+        failing = bool(rows) and never >= MOST * len(rows)
+        cases.append(Case(_short(controller), f"{never} of {len(rows)} never settle", failing))
+    return judged(cases)
 
 
 def _epsilon_y(table: Table) -> Judged:
-    measured, wide = [], []
+    cases = []
     for controller in EPSILONS:
         for figure in (9, 10):
             rows = rows_of(table, figure, controller)
             x, y = middle(rows, "rms_x_cm"), middle(rows, "rms_y_cm")
-            wide.append(None if x is None or y is None else y >= 2.0 * x)
-            measured.append(f"{_short(controller)}, Fig. {figure}: x {number(x)}, y {number(y)} cm")
-    return "; ".join(measured), _of_cases(wide)
+            wide = None if x is None or y is None else y >= 2.0 * x
+            cases.append(
+                Case(f"{_short(controller)}, Fig. {figure}", f"x {number(x)}, y {number(y)} cm", wide)
+            )
+    return judged(cases)
 
 
 def _short(controller: str) -> str:
@@ -152,29 +197,35 @@ def _short(controller: str) -> str:
 
 
 def _chattering(table: Table) -> Judged:
-    texts, higher = [], []
+    cases = []
     for figure in (9, 10):
         for controller in EPSILONS:
-            text, case = _compared(table, figure, controller, "chattering_m_s2")
-            higher.append(case)
-            texts.append(f"Fig. {figure}, {_short(controller)}: {text}")
-    return "; ".join(texts), _of_cases(higher)
+            text, higher = _compared(table, figure, controller, "chattering_m_s2")
+            cases.append(Case(f"Fig. {figure}, {_short(controller)}", text, higher))
+    return judged(cases)
 
 
 def _superior(table: Table) -> Judged:
-    texts, better = [], []
+    texts, verdicts = [], []
     for rival in RIVALS:
         counts = []
         for camera in ALL_CAMERAS:
             for error in ERRORS:
                 cases = comparisons(table, rival, camera, error)
-                better += [case.verdict == OURS for case in cases]
+                verdicts += [case.verdict for case in cases]
                 counts.append(f"{camera_name(camera)}, {error}: {wins(cases, OURS)} / {wins(cases, THEIRS)}")
         texts.append(f"beside {_short(rival)}: {'; '.join(counts)}")
     measured = (
         f"starts, of {len(STARTS)}, from which the paper's law is better / the other law: {'. '.join(texts)}"
     )
-    return measured, _of_cases(better)
+    deciding = superior(verdicts)
+    return Judged(measured, deciding, _of_cases([verdict == OURS for verdict in verdicts]))
+
+
+def superior(verdicts: Sequence[str]) -> str:
+    """What decides the last claim."""
+    better, worse = verdicts.count(OURS), verdicts.count(THEIRS)
+    return f"better in {better} of {len(verdicts)} comparisons, worse in {worse}"
 
 
 def _compared(table: Table, figure: int, controller: str, name: str) -> tuple[str, bool | None]:

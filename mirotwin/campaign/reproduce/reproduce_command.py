@@ -29,6 +29,7 @@ from mirotwin.campaign.reproduce.plan import (
     recorded,
 )
 from mirotwin.campaign.reproduce.rows import RunRow, by_label, middle_seeds, row_of
+from mirotwin.campaign.reproduce.tables import tables_of
 from mirotwin.campaign.worker import Work
 from mirotwin.campaign.workers import Processes, Workers
 from mirotwin.shell.command import Options, command_of
@@ -42,6 +43,7 @@ from mirotwin.shell.verdicts import exit_code
 PAGE = "reproduction.md"
 FOLDER = "reproduction"
 ROWS = "rows.csv"
+TABLES = "tables.json"
 
 
 class ReproduceOptions(Options, frozen=True, kw_only=True):
@@ -58,13 +60,13 @@ class ReproduceOptions(Options, frozen=True, kw_only=True):
 def reproduce(options: ReproduceOptions) -> int:
     """Runs Figs. 6 to 10 of the paper, and the comparison of its controllers, over all seeds.
 
-    Writes reproduction.md (each claim beside what was measured), and in the folder reproduction: five pictures, a row
-    for each run, and of each controller and start the recording of the run with the median error. Running it again
-    gives the same bytes.
+    Writes reproduction.md (each claim with its verdict), and in the folder reproduction: five pictures, rows.csv with a
+    row for each run, tables.json with all tables, and of each controller and start the recording of the run with the
+    median error. Running it again gives the same bytes.
     """
     seeds, force, quiet, out = options.seeds, options.force, options.quiet, options.out or Path(".")
     began_s = time.monotonic()
-    names = [*(f"{start.name}.svg" for start in STARTS), ROWS, *(group.recording for group in GROUPS)]
+    names = [*(f"{start.name}.svg" for start in STARTS), ROWS, TABLES, *(group.recording for group in GROUPS)]
     folder = OutputFolder(out / FOLDER, force, names)
     if (out / FOLDER).is_dir() or (out / PAGE).exists():
         check_new(out / PAGE, "--out", force)
@@ -82,8 +84,9 @@ def reproduce(options: ReproduceOptions) -> int:
         _record(jobs, workers, folder, hold, quiet)
         for start in STARTS:
             _draw(start, folder, shown)
-        text = page(by_label(rows), f"{seeds[0]} to {seeds[-1]}", FOLDER)
-        page_path.write_text(text, encoding="utf-8")
+        tables = tables_of(by_label(rows), f"{seeds[0]} to {seeds[-1]}")
+        tables.write(folder.part(TABLES))
+        page_path.write_text(page(tables, FOLDER, TABLES), encoding="utf-8")
     if not quiet:
         show_line(f"{amount(len(rows), 'run')} in {time.monotonic() - began_s:.0f} s: {out / PAGE}")
     return _failures(rows)
