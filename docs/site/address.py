@@ -1,7 +1,7 @@
 """The address of Mirotwin's repository: `python -m docs.site.address https://HOST/PATH` sets it.
 
 The setting is `[project.urls] Repository` in `pyproject.toml`; it is `PLACEHOLDER` until the address is known. The site
-and `mirotwin init` read it. README.md and CITATION.cff hold a copy, which the command writes, too.
+and `mirotwin init` read it. The other `FILES` hold a copy, which the command writes, too.
 """
 
 from __future__ import annotations
@@ -14,7 +14,7 @@ from pathlib import Path
 from mirotwin.testing.origin import PLACEHOLDER
 
 ROOT = Path(__file__).parents[2]
-FILES = ("pyproject.toml", "README.md", "CITATION.cff")
+FILES = ("pyproject.toml", "README.md", "docs/index.md", "CITATION.cff")
 ADDRESS = re.compile(r"https://[\w.-]+(/[\w.~-]+)+")
 
 

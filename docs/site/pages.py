@@ -27,11 +27,12 @@ from properdocs.structure.pages import Page
 
 ROOT = Path(__file__).parents[2]
 sys.path[:0] = [str(ROOT)]  # properdocs loads this file by its path
-from docs.site import address, howtos, release, tables  # noqa: E402
-from mirotwin.testing.origin import PLACEHOLDER  # noqa: E402
+from docs.site import howtos, release, tables  # noqa: E402
 
 DOCS = "docs"
 HOME = {"README.md": "index.md"}
+HEADS = {"CHANGELOG.md": "---\nsearch:\n  boost: 0.1\n---\n"}
+"""What is put before a document: search finds a page before its line in the changelog."""
 LANGUAGES = {".py": "python", ".toml": "toml", ".c": "c", ".h": "c", ".lua": "lua", ".yml": "yaml"}
 LINK = re.compile(r"(?<!\\)(!?\[(?:[^\[\]`]|`[^`]*`|\[[^\]]*\])*\]\()([^()\s]+)(\))")
 FENCE = re.compile(r"^ {0,3}(```+|~~~+)")
@@ -160,7 +161,7 @@ def on_files(files: Files, config: ProperDocsConfig) -> Files:
     pages = {path.src_uri: path.content_string for path in files.documentation_pages()}
     for name, site_path in _tree.documents.items():
         if name not in HOME:
-            pages[site_path] = (ROOT / name).read_text("utf-8")
+            pages[site_path] = HEADS.get(name, "") + (ROOT / name).read_text("utf-8")
             files.append(File.generated(config, site_path, content=pages[site_path]))
     for site_path, text in pages.items():
         relinked(text, site_path)
@@ -179,11 +180,10 @@ def on_page_content(html: str, **_: Any) -> str:
 
 
 def on_page_markdown(markdown: str, page: Page, **_: Any) -> str:
-    """Rewrites the links of one page, and fills in its tables and the address of the repository."""
+    """Rewrites the links of one page, and fills in its tables."""
     here = page.file.src_uri
     if here == howtos.INDEX:
         markdown = howtos.with_first_sentences(markdown, ROOT / origin(here))
-    markdown = markdown.replace(PLACEHOLDER, address.known() or PLACEHOLDER)
     return relinked(tables.filled(markdown), here)
 
 

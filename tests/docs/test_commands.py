@@ -1,4 +1,4 @@
-"""Commands in running text and in tables have options that exist."""
+"""Commands in running text and in tables have options and modules that exist."""
 
 import re
 
@@ -9,6 +9,7 @@ from mirotwin.commands import main
 from tests.docs import sandbox
 
 COMMAND = re.compile(r"`(?:\.\. \\?\| )?mirotwin ([a-z][^`\n]*)`")
+MODULE = re.compile(r"python -m ((?:benchmarks|docs|tests)(?:\.\w+)+)")
 OPTION = re.compile(r"(?<![\w-])--?[a-z][a-z0-9-]*")
 
 
@@ -42,6 +43,18 @@ def test_options_in_the_text_exist(document):
             wrong.append(line)
         said = re.sub(r"'[^']*'|\"[^\"]*\"", "", line.partition(" | ")[0].partition("&&")[0])
         wrong += [f"{line}: {option}" for option in OPTION.findall(said) if option not in options]
+    assert not wrong
+
+
+@pytest.mark.parametrize("document", sandbox.documents())
+def test_modules_of_the_tree_that_a_document_runs_exist(document):
+    named = set(MODULE.findall((sandbox.ROOT / document).read_text("utf-8")))
+    paths = {name: sandbox.ROOT / name.replace(".", "/") for name in named}
+    wrong = [
+        name
+        for name, path in paths.items()
+        if not path.with_suffix(".py").exists() and not (path / "__main__.py").exists()
+    ]
     assert not wrong
 
 

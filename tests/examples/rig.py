@@ -20,7 +20,7 @@ def installed(name, folder):
 
 
 def run(site, *command):
-    """Outputs and exit code of a program; `site` comes before another checkout (CONTRIBUTING.md)."""
+    """Outputs and exit code of a program; `site` comes before another checkout (docs/commands.md)."""
     paths = [str(site), os.environ.get("PYTHONPATH", "")]
     environment = {**os.environ, "PYTHONPATH": os.pathsep.join(path for path in paths if path)}
     return children.run([*map(str, command)], env=environment, capture_output=True, text=True)

@@ -17,17 +17,19 @@ ADDRESS = "https://example.org/somebody/mirotwin"
 def tree(tmp_path):
     """The files with the address, before it is set."""
     for name in address.FILES:
+        (tmp_path / name).parent.mkdir(exist_ok=True)
         shutil.copy(address.ROOT / name, tmp_path / name)
     address.write(PLACEHOLDER, tmp_path)
     return tmp_path
 
 
-def test_readme_and_citation_have_the_address_of_the_setting_and_no_other():
-    readme = (address.ROOT / "README.md").read_text("utf-8")
+def test_front_pages_and_citation_have_the_address_of_the_setting_and_no_other():
+    pages = [(address.ROOT / name).read_text("utf-8") for name in ("README.md", "docs/index.md")]
     citation = yaml.safe_load((address.ROOT / "CITATION.cff").read_text("utf-8"))
     assert citation["repository-code"] == address.setting()
-    assert re.findall(r"git clone (\S+)", readme) == [address.setting()]
-    others = {*re.findall(r"https?://[^\s)`\"]+", readme)} - {address.setting()}
+    for page in pages:
+        assert re.findall(r"git clone (\S+)", page) == [address.setting()]
+    others = {*re.findall(r"https?://[^\s)`\"]+", "".join(pages))} - {address.setting()}
     assert others == {"https://doi.org/10.1109/70.768190"}
 
 

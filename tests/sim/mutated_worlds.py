@@ -5,7 +5,7 @@
   refuse them with a ValueError and leave the world as it was, or the world must run for a control period.
 
 Neither may crash, hang, raise anything else, or touch memory that is not its own: run it with modules that were built
-with the address sanitizer (CONTRIBUTING.md).
+with the address sanitizer (docs/commands.md).
 """
 
 import argparse
