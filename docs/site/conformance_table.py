@@ -1,4 +1,4 @@
-"""Writes the table of docs/conformance.md from the rules: `python -m docs.site.conformance_table`."""
+"""The table of rules that the site puts into docs/conformance.md: `python -m docs.site.conformance_table` prints it."""
 
 from __future__ import annotations
 

@@ -1,8 +1,9 @@
-"""Tables that are made from the code when the site is built: keys of scenarios, channels, figures of a campaign.
+"""Tables that are made from the code when the site is built: keys of scenarios, channels, figures of a campaign, rules.
 
 <!-- keys: miro_sim.scenario.keys:Scenario -->      a section for each struct of keys
 <!-- channels -->                                   one for each channel of a recording
 <!-- figures -->                                    the columns of a results file
+<!-- rules -->                                      the rules of `mirotwin conform`, in the folder of the documents
 """
 
 from __future__ import annotations
@@ -16,7 +17,9 @@ from typing import Any
 import msgspec
 from msgspec import inspect as kinds
 
-MARK = re.compile(r"^<!-- (keys: (?P<keys>[\w.]+:\w+)|channels|figures) -->$", re.MULTILINE)
+from docs.site import conformance_table
+
+MARK = re.compile(r"^<!-- (keys: (?P<keys>[\w.]+:\w+)|channels|figures|rules) -->$", re.MULTILINE)
 
 
 def filled(markdown: str) -> str:
@@ -28,6 +31,8 @@ def _table(found: re.Match[str]) -> str:
     if found["keys"]:
         module, _, name = found["keys"].partition(":")
         return "\n".join(key_sections(getattr(import_module(module), name)))
+    if found[1] == "rules":
+        return conformance_table.render()
     return "\n".join(channel_sections() if found[1] == "channels" else figure_rows())
 
 

@@ -12,6 +12,7 @@ import pytest
 import mirotwin
 from docs.site import address
 from mirotwin.commands import CAMERA, CAMPAIGN, FIRMWARE, SECTIONS
+from mirotwin.conform.rules import CHAPTERS
 from tests import children
 from tests.docs import sandbox
 from tests.mirotwin.report.page import browser
@@ -68,7 +69,7 @@ def test_every_public_name_is_in_the_reference(site):
     assert not missing
 
 
-def test_keys_channels_and_columns_are_the_codes(site):
+def test_keys_channels_columns_and_rules_are_the_codes(site):
     keys = (site / "formats/scenario.html").read_text("utf-8")
     some = {"bit_error_rate", "window_px", "gamma1_per_s", "compute_s", "busy_clocks", "torque_constant_nm_a"}
     assert some <= set(re.findall(r"<code>(\w+)</code>", keys))
@@ -79,6 +80,8 @@ def test_keys_channels_and_columns_are_the_codes(site):
         assert f"<td><code>{key}</code></td>\n<td>{span}</td>" in keys
     assert "exposed_tick" in (site / "formats/recording.html").read_text("utf-8")
     assert "rms_position_cm" in (site / "formats/parquet.html").read_text("utf-8")
+    rules = re.findall(r"<tr>\n<td>(P\d\d)</td>", (site / "conformance.html").read_text("utf-8"))
+    assert rules == [rule.id for chapter in CHAPTERS for rule in chapter.rules]
 
 
 def test_no_page_fetches_anything_from_elsewhere(site):
