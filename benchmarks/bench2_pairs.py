@@ -42,21 +42,41 @@ class Standing(NamedTuple):
         return (lost - won, -self.settled, truth.median if truth else 0.0)
 
 
+def verdicts_of(rows: Rows, of_class: str, figure: str) -> dict[tuple[str, str], list[int]]:
+    """Of each pair of entries: a verdict in each case, 1 if the second is better, -1 if it is worse."""
+    cases, pairs = cases_of(rows, of_class), list(combinations(ENTRIES, 2))
+    alpha = ALPHA / (len(pairs) * len(cases) * JUDGED)
+    return {
+        (first, second): [
+            compared(rows[first, case], rows[second, case], alpha).verdict(figure) for case in cases
+        ]
+        for first, second in pairs
+    }
+
+
 def standings(rows: Rows, of_class: str) -> list[Standing]:
     """The entries of a class, the best one first: by comparisons won less those lost, with every other, by truth."""
-    cases, names = cases_of(rows, of_class), list(ENTRIES)
-    alpha = ALPHA / (len(list(combinations(names, 2))) * len(cases) * JUDGED)
-    score = {name: {figure: [0, 0] for figure in FIGURES} for name in names}
-    for first, second in combinations(names, 2):
-        for case in cases:
-            result = compared(rows[first, case], rows[second, case], alpha)
-            for figure in FIGURES:
-                if verdict := result.verdict(figure):
-                    winner, loser = (second, first) if verdict > 0 else (first, second)
-                    score[winner][figure][0] += 1
-                    score[loser][figure][1] += 1
-    found = [_standing(name, [rows[name, case] for case in cases], score[name]) for name in names]
+    cases = cases_of(rows, of_class)
+    score = {name: {figure: [0, 0] for figure in FIGURES} for name in ENTRIES}
+    for figure in FIGURES:
+        for (first, second), verdicts in verdicts_of(rows, of_class, figure).items():
+            better, worse = verdicts.count(1), verdicts.count(-1)
+            for name, won, lost in ((first, worse, better), (second, better, worse)):
+                score[name][figure][0] += won
+                score[name][figure][1] += lost
+    found = [_standing(name, [rows[name, case] for case in cases], score[name]) for name in ENTRIES]
     return sorted(found, key=lambda one: one.rank)
+
+
+def alike(rows: Rows, of_class: str) -> int:
+    """How many of the first entries cannot be told apart by truth: no comparison of two of them decides."""
+    verdicts = verdicts_of(rows, of_class, "truth")
+    names = [one.entry for one in standings(rows, of_class)]
+    for count in range(1, len(names)):
+        pairs = [(name, names[count]) for name in names[:count]]
+        if any(any(verdicts.get(pair) or verdicts[pair[::-1]]) for pair in pairs):
+            return count
+    return len(names)
 
 
 def _standing(name: str, runs: Sequence[Row], score: Mapping[str, Sequence[int]]) -> Standing:

@@ -4,27 +4,29 @@ from __future__ import annotations
 
 from itertools import combinations
 from statistics import median
+from textwrap import fill
 
 from benchmarks.bench2 import CLASSES, EKF, ENTRIES, ESTIMATORS, FIG_6, FIG_8, LAWS, NONE, REFERENCE
-from benchmarks.bench2_pairs import FIGURES, JUDGED, Rows, asked, cases_of, of_seeds
+from benchmarks.bench2_pairs import FIGURES, JUDGED, Rows, alike, asked, cases_of, of_seeds
 from benchmarks.bench2_score import ALPHA, compared
 
 PATH = "round"
 SHOWS = """\
-* **The filter makes most of it.** On the closed path `ekf` takes the camera error of {names} from
-  {plain_camera_none} cm to {plain_camera_ekf} cm. Their truth error stays where the wrong calibration puts it,
-  {plain_truth_none} cm before and {plain_truth_ekf} cm after; with self-calibration it falls from
-  {learning_truth_none} cm to {learning_truth_ekf} cm.
-* **The law makes less of it.** With `ekf`, {others} against `{reference}`:
-  of {law_count} comparisons {law_better} are better in truth, {law_worse} worse, and {law_unknown} cannot be told
-  after correction.
-* **Where wheels slip fewer runs settle with `ekf`**, for a reason that was not tested: of {slip_count} runs
-  {slip_none} settle without an estimator, {slip_predict} with `predict`, {slip_ekf} with `ekf`.
-* **A wrong camera hides which entry is nearer.** In the plain class errors decide {plain_camera} of {pair_count}
-  comparisons by camera, {plain_truth} in truth, and {plain_opposite} in opposite ways; self-calibrated,
-  {learning_camera} by camera, {learning_truth} in truth, and {learning_opposite} in opposite ways.
-* **The paper's law comes to the path from few of these starts.** With one set of gains it settles in {paper_best} of
-  {paper_count} runs at best ({paper_name}). Its gains were chosen for single starts.
+* **The first places cannot be told apart**: no comparison by truth decides between the first {plain_alike} entries of
+  the plain class, nor between the first {learning_alike} of the self-calibrated one.
+* **The filter makes most of it.** On the closed path the camera error of {names} is {plain_camera_none} cm without an
+  estimator and {plain_camera_ekf} cm with `ekf`. Their truth error stays where the wrong calibration puts it
+  ({plain_truth_none} and {plain_truth_ekf} cm). With self-calibration it is {learning_truth_none} and
+  {learning_truth_ekf} cm.
+* **The law makes less of it.** With `ekf`, the others of these laws are better than `{reference}` in {law_better} of
+  {law_count} comparisons by truth and worse in {law_worse}; {law_unknown} cannot be told after correction.
+* **Where wheels slip fewer runs settle with `ekf`**, for a reason that was not tested: of {slip_count} runs {slip_none}
+  without an estimator, {slip_predict} with `predict`, {slip_ekf} with `ekf`.
+* **A wrong camera hides which entry is nearer.** Errors decide {plain_truth} of {pair_count} comparisons in truth and
+  {plain_camera} by camera (plain), {learning_truth} and {learning_camera} self-calibrated; in opposite ways
+  {plain_opposite} and {learning_opposite}.
+* **The paper's law comes to the path from few of these starts**: {paper_best} of {paper_count} runs at best
+  ({paper_name}). Its gains were chosen for single starts.
 """
 
 
@@ -47,6 +49,7 @@ def shows(rows: Rows) -> str:
     }
     for name, these in cases.items():
         values |= {f"{name}_{word}": count for word, count in _decided(rows, these).items()}
+        values[f"{name}_alike"] = alike(rows, dict(zip(cases, CLASSES, strict=True))[name])
     slip = [case for these in cases.values() for case in these if case.startswith("slip")]
     values |= {f"slip_{one}": sum(_settled(rows, law, one, slip) for law in LAWS) for one in ESTIMATORS}
     papers = {
@@ -55,9 +58,8 @@ def shows(rows: Rows) -> str:
         for one in ESTIMATORS
     }
     best = max(papers, key=lambda name: papers[name])
-    return SHOWS.format(
+    text = SHOWS.format(
         names=", ".join(f"`{law}`" for law in sound),
-        others=", ".join(f"`{law}`" for law in sound if law != REFERENCE),
         reference=REFERENCE,
         slip_count=len(LAWS) * len(slip) * seeds,
         paper_best=papers[best],
@@ -67,6 +69,12 @@ def shows(rows: Rows) -> str:
         **_of_laws(rows, [law for law in sound if law != REFERENCE]),
         pair_count=len(list(combinations(ENTRIES, 2))) * len(cases["plain"]),
     )
+    return "".join(_filled(bullet) + "\n" for bullet in text.rstrip().split("\n* "))
+
+
+def _filled(bullet: str) -> str:
+    text = " ".join(bullet.removeprefix("* ").split())
+    return fill(f"* {text}", 120, subsequent_indent="  ", break_long_words=False, break_on_hyphens=False)
 
 
 def _settled(rows: Rows, law: str, estimator: str, cases: list[str] | tuple[str, ...]) -> int:

@@ -28,10 +28,9 @@ HEAD = """\
 Which claims of the paper hold on this twin, and which of its two laws is better.
 
 {opening}
-J.-M. Yang, J.-H. Kim, "Sliding Mode Control for Trajectory Tracking of Nonholonomic Wheeled Mobile Robots", IEEE
-Trans. Robotics and Automation 15(3), 1999. `mirotwin reproduce` makes this page: {runs} runs with firmware, LM629,
-motors, radio and camera, seeds {seeds}, 6 s each, with the same figures on every computer. It also writes
-[all tables]({tables}), and rows.csv with a row for each run.
+The paper: [Yang and Kim, 1999](https://doi.org/10.1109/70.768190). `mirotwin reproduce` makes this page: {runs} runs
+with firmware, LM629, motors, radio and camera, seeds {seeds}, 6 s each, with the same figures on every computer. It
+also writes [all tables]({tables}), and rows.csv with a row for each run.
 
 The paper does not give its gains, paths, speeds, origin, nor the cause of its 2.40 cm. Chosen here:
 
@@ -126,16 +125,14 @@ def _better(found: StoredTables) -> Iterator[str]:
     yield BETTER.format(count=COMPARISONS, level=100 * SHARE)
     lines = [
         (
-            rival.removeprefix("epsilon, "),
-            camera_name(camera),
-            error,
+            f"{rival.removeprefix('epsilon, ')}; {camera_name(camera)}; {error}",
             *map(_cell, _compared(found, rival, camera, error)),
         )
         for rival in RIVALS
         for camera in ALL_CAMERAS
         for error in ERRORS
     ]
-    yield from _table(("beside", "camera", "error", *(f"Fig. {start.figure}" for start in STARTS)), lines)
+    yield from _table(("rival; camera; error", *(f"Fig. {start.figure}" for start in STARTS)), lines)
 
 
 def _cell(row: Row) -> str:
@@ -175,7 +172,7 @@ def _figures(found: StoredTables, folder: str) -> Iterator[str]:
         )
     yield "The pictures show, of each controller, the run with the median error.\n"
     for start in STARTS:
-        yield f"![Fig. {start.figure}: in truth, and as the camera sees it]({folder}/{start.name}.svg)\n"
+        yield f"![Fig. {start.figure} again]({folder}/{start.name}.svg)\n"
 
 
 def _cameras(found: StoredTables) -> Iterator[str]:

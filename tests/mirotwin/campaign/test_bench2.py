@@ -73,12 +73,21 @@ def test_the_leaderboard_has_each_run_of_each_entry():
             assert all(len(digest) == bench2.DIGITS for digest in one.digests)
 
 
-def test_the_page_and_its_picture_are_what_the_leaderboard_says(tmp_path):
-    copy = tmp_path / "benchmark.md"
+def test_page_picture_and_standings_are_what_the_leaderboard_says(tmp_path):
+    copy, tables = tmp_path / "benchmark.md", tmp_path / "standings.json"
     copy.write_text(PAGE.read_text(encoding="utf-8"), encoding="utf-8")
-    bench2_page.write(copy, ROWS)
+    bench2_page.write(copy, ROWS, tables)
     assert copy.read_text(encoding="utf-8") == PAGE.read_text(encoding="utf-8")
     assert (tmp_path / bench2_page.PICTURE).read_bytes() == (PAGE.parent / bench2_page.PICTURE).read_bytes()
+    assert tables.read_bytes() == bench2_page.STANDINGS.read_bytes()
+
+
+def test_what_the_page_says_of_bench_1_are_counts_of_the_leaderboard():
+    settled = {row[0]: row[1] for row in bench2_page.tables_of(ROWS).rows("bench 1")}
+    text = " ".join(PAGE.read_text(encoding="utf-8").split())
+    assert f"the arc: {settled['paper']} runs settle" in text
+    alone = [settled[f"Fig. {figure} alone"].partition(" ")[0] for figure in (6, 8)]
+    assert f"{' or '.join(alone)} settle" in text
 
 
 @pytest.mark.parametrize("entry", ["body_frame, none", "samson, ekf"])

@@ -206,9 +206,9 @@ def test_the_page_opens_with_the_errors_that_rank_the_laws_oppositely():
     assert OPPOSITE in text
     assert "with `pixels, 1997` from 4 / 1 in truth and 0 / 5 as the camera sees it" in text
     one, far = "**paper** 1.00/2.00", "**epsilon** (0/20)"
-    assert f"| retuned | pixels, 1997 | truth | {one} | {one} | {one} | {far} | {one} |" in text
+    assert f"| retuned; pixels, 1997; truth | {one} | {one} | {one} | {far} | {one} |" in text
     one = "**epsilon** 0.90/0.30"
-    assert f"| retuned | pixels, 1997 | camera | {one} | {one} | {one} | {far} | {one} |" in text
+    assert f"| retuned; pixels, 1997; camera | {one} | {one} | {one} | {far} | {one} |" in text
     assert OPPOSITE not in page(table())
     comparisons = tables_of(rows, "0 to 19").rows("comparisons")
     key = [RETUNED, "pixels, 1997", "truth"]
@@ -218,7 +218,7 @@ def test_the_page_opens_with_the_errors_that_rank_the_laws_oppositely():
 
 def test_too_few_seeds_give_medians_and_no_verdict():
     rows = {label: rows[:5] for label, rows in table(fig6_epsilon_retuned={"rms_position_cm": 9.0}).items()}
-    assert "| retuned | pixels, 1997 | truth | not judged: (5/5) |" in page(rows, "0 to 4")
+    assert "| retuned; pixels, 1997; truth | not judged: (5/5) |" in page(rows, "0 to 4")
     first = tables_of(rows, "0 to 4").rows("comparisons")[0]
     assert first == [
         RETUNED,
