@@ -155,7 +155,6 @@ FUNCTIONS = {
     "mirotwin/replay/README.md": late,
     "mirotwin/verify/steps/README.md": late,
     "mirotwin/verify/cases/README.md": late_case,
-    "docs/fuzz-any-8051.md": dimmer,
     "examples/fuzz-slip/README.md": dimmer,
     "mirotwin/fuzz/README.md": regression("tests/cases"),
     "mirotwin/fuzz/afl/README.md": question,

@@ -376,9 +376,9 @@ def test_firmware_that_sleeps_is_watched_that_long_too():
     assert target.end_tick() - target.harness.end_tick >= 24_000 * 70
 
 
-# The page about foreign firmware: its check and its format work as they stand there
+# The page about fuzzing: its check and its format work as they stand there
 
-PAGE = (Path(__file__).parents[4] / "docs" / "fuzz-any-8051.md").read_text(encoding="utf-8")
+PAGE = (Path(__file__).parents[4] / "docs" / "howto" / "fuzz.md").read_text(encoding="utf-8")
 CHECK, FORMAT = re.findall(r"```python\n(.*?)```", PAGE, re.DOTALL)
 
 
