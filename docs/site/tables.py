@@ -1,17 +1,21 @@
-"""Tables that are made from the code when the site is built: keys of scenarios, channels, figures of a campaign, rules.
+"""Tables that are made from the code when the site is built: keys of scenarios, channels, figures of a campaign, rules,
+and of files of rows.
 
 <!-- keys: miro_sim.scenario.keys:Scenario -->      a section for each struct of keys
 <!-- channels -->                                   one for each channel of a recording
 <!-- figures -->                                    the columns of a results file
 <!-- rules -->                                      the rules of `mirotwin conform`, in the folder of the documents
+<!-- csv: tests/robot/ucsim/disagreements.csv -->   a file of the tree, whose cells are Markdown
 """
 
 from __future__ import annotations
 
+import csv
 import inspect
 import re
 from collections.abc import Iterator
 from importlib import import_module
+from pathlib import Path
 from typing import Any
 
 import msgspec
@@ -19,7 +23,11 @@ from msgspec import inspect as kinds
 
 from docs.site import conformance_table
 
-MARK = re.compile(r"^<!-- (keys: (?P<keys>[\w.]+:\w+)|channels|figures|rules) -->$", re.MULTILINE)
+ROOT = Path(__file__).parents[2]
+
+MARK = re.compile(
+    r"^<!-- (keys: (?P<keys>[\w.]+:\w+)|channels|figures|rules|csv: (?P<csv>[\w./-]+)) -->$", re.MULTILINE
+)
 
 
 def filled(markdown: str) -> str:
@@ -31,6 +39,8 @@ def _table(found: re.Match[str]) -> str:
     if found["keys"]:
         module, _, name = found["keys"].partition(":")
         return "\n".join(key_sections(getattr(import_module(module), name)))
+    if found["csv"]:
+        return "\n".join(csv_rows(ROOT / found["csv"]))
     if found[1] == "rules":
         return conformance_table.render()
     return "\n".join(channel_sections() if found[1] == "channels" else figure_rows())
@@ -178,3 +188,14 @@ def figure_rows() -> Iterator[str]:
     yield "| column | type |\n|---|---|"
     for name, kind in FIGURES.items():
         yield f"| `{name}` | {'true or false' if kind is bool else kind.__name__} |"
+
+
+# Files of rows
+
+
+def csv_rows(path: Path) -> Iterator[str]:
+    """The lines of a table with the rows of a file, the first one its head."""
+    with path.open(encoding="utf-8", newline="") as file:
+        head, *rows = csv.reader(file)
+    for row in (head, ["---"] * len(head), *rows):
+        yield f"| {' | '.join(cell.replace('|', chr(92) + '|') for cell in row)} |"

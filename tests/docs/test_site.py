@@ -82,6 +82,7 @@ def test_keys_channels_columns_and_rules_are_the_codes(site):
     assert "rms_position_cm" in (site / "formats/parquet.html").read_text("utf-8")
     rules = re.findall(r"<tr>\n<td>(P\d\d)</td>", (site / "conformance.html").read_text("utf-8"))
     assert rules == [rule.id for chapter in CHAPTERS for rule in chapter.rules]
+    assert "<td>timer-1-beside-mode-3</td>" in (site / "tests/vectors/index.html").read_text("utf-8")
 
 
 def test_no_page_fetches_anything_from_elsewhere(site):

@@ -1,6 +1,6 @@
 """What a random walk must not do, because ucsim is known to do it wrong.
 
-The names in the comments are those of the list in `tests/vectors/README.md`.
+The names in the comments are those of `disagreements.csv`.
 """
 
 from functools import cache

@@ -1,5 +1,6 @@
-"""Each entry of the list in `tests/vectors/README.md` shown on both machines, so that it cannot go stale."""
+"""Each entry of `disagreements.csv` shown on both machines, so that it cannot go stale."""
 
+import csv
 import re
 from pathlib import Path
 
@@ -9,12 +10,10 @@ from miro_robot.mcs51.cpu import Cpu
 from miro_robot.mcs51.xram import XramBus
 from tests.robot.mcs51.asm import assemble
 from tests.robot.ucsim import exclusions, lockstep, s51
-from tests.vectors.paths import VECTORS
 
 CPU_TESTS = Path(__file__).parents[1] / "mcs51"
-LISTED = re.findall(
-    r"(?m)^\| ([a-z0-9-]+) \|.*\| `(\w+\.py)::(\w+)` \|$", (VECTORS / "README.md").read_text()
-)
+with (Path(__file__).parent / "disagreements.csv").open(encoding="utf-8", newline="") as table:
+    LISTED = [(name, *held.strip("`").split("::")) for name, *_, held in list(csv.reader(table))[1:]]
 """Name, file and test of each entry."""
 pytestmark = pytest.mark.skipif(not s51.installed(), reason="needs ucsim's s51")
 
