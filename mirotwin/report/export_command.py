@@ -13,6 +13,7 @@ from msgspec.structs import replace
 
 from miro_exact.bad_input import BadInput, amount
 from miro_exact.inputs import check_memory
+from miro_protocol.actions import ScriptItem
 from miro_protocol.transmission import DOWN, Transmission
 from miro_sim.scenario.board import BoardScenario
 from miro_sim.scenario.board_scenario import check_single
@@ -22,6 +23,7 @@ from mirotwin.recording.capture.input import STDIN, Input
 from mirotwin.recording.capture.layout import look
 from mirotwin.recording.capture.options import CaptureOptions
 from mirotwin.recording.capture.source import READ_ERRORS, form_of, timed_capture
+from mirotwin.recording.reader import read
 from mirotwin.report.board_export import HEAD_BYTES, board_rows, board_stream, is_of_board
 from mirotwin.report.tables import Named, Tables, recorded_rows, wire_row
 from mirotwin.runs.job import Job, load_job
@@ -191,7 +193,10 @@ def export(options: ExportOptions) -> int:
         source = timed_capture(given, complain, options.capture, form)
         layouts = look(source, None, complain) if to == "stream" else None
         exported = Exported(source.sent, network, given, bar)
-        pieces = render.to_stream(exported, layouts.of, source) if layouts else render.to_pcapng(exported)
+        actions = _actions(options, form) if layouts else []
+        pieces = (
+            render.to_stream(exported, layouts.of, source, actions) if layouts else render.to_pcapng(exported)
+        )
         with BadInput.at(given.label):
             _write(out, _some(pieces, exported, given.label))
     if not quiet and out != STDIN:
@@ -204,6 +209,19 @@ def export(options: ExportOptions) -> int:
         complain(f"error: {exported.failure}; everything before it was written")
         return BAD_INPUT
     return DONE
+
+
+def _actions(options: ExportOptions, form: Form) -> list[ScriptItem]:
+    """Resets, faults and other actions of a recording. From a pipe they cannot be read a second time."""
+    if form.name != "recording" or options.file == STDIN:
+        return []
+    try:
+        periods = read(options.file).periods
+    except READ_ERRORS:
+        return []  # the characters meet the same damage, and say so
+    return [
+        action for period in periods for action in period.actions if options.network in (None, action.network)
+    ]
 
 
 def export_tables(options: ExportOptions, given: Input, form: Form, bar: ProgressBar, of_board: bool) -> int:

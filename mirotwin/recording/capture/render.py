@@ -15,6 +15,7 @@ from __future__ import annotations
 import tempfile
 from collections import Counter
 from collections.abc import Callable, Iterable, Iterator
+from heapq import merge
 from typing import Any
 
 import msgspec
@@ -22,6 +23,7 @@ import msgspec
 from miro_exact.bad_input import BadInput, amount
 from miro_exact.clock import seconds
 from miro_protocol import pcapng, stream
+from miro_protocol.actions import ScriptItem
 from miro_protocol.events import Damaged, Received
 from miro_protocol.frames import Message, ServiceFrame, TeamFrame, describe
 from miro_protocol.stream_line import FIRST_LINE, version_of
@@ -194,9 +196,14 @@ def _packets(sent: Iterable[Transmission]) -> Iterator[Transmission]:
 
 
 def to_stream(
-    sent: Iterable[Transmission], layout: Callable[[int], int], source: Source | None = None
+    sent: Iterable[Transmission],
+    layout: Callable[[int], int],
+    source: Source | None = None,
+    actions: Iterable[ScriptItem] = (),
 ) -> Iterator[bytes]:
     """A line a transmission, with its content as comment. ConversionError for ticks that go backwards.
+
+    `actions`, in the order of their ticks, get a line each among them.
 
     What `source` notes of itself follows the first line.
 
@@ -205,16 +212,15 @@ def to_stream(
     """
     version, last = 1, 0
     with tempfile.TemporaryFile() as lines:
-        for transmission in sent:
-            if transmission.tick < last:
+        for item in merge(sent, actions, key=lambda item: item.tick):
+            if item.tick < last:
                 problem = f"comes after tick {last}"
-                raise ConversionError(
-                    transmission.tick, problem, "sort the capture first (`reordercap` does)"
-                )
-            last = transmission.tick
-            version = max(version, version_of(transmission))
-            comment = "; ".join(described(row) for row in rows([transmission], layout))
-            lines.write(f"{stream.format_line(transmission, comment)}\n".encode())
+                raise ConversionError(item.tick, problem, "sort the capture first (`reordercap` does)")
+            last = item.tick
+            version = max(version, version_of(item))
+            sent_rows = rows([item], layout) if isinstance(item, Transmission) else ()
+            comment = "; ".join(described(row) for row in sent_rows)
+            lines.write(f"{stream.format_line(item, comment)}\n".encode())
         yield f"{FIRST_LINE.format(version)}\n".encode()
         for note in source.notes if source else ():
             yield f"# {note}\n".encode()

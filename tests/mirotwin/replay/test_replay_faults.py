@@ -29,3 +29,14 @@ def test_a_fault_of_a_robot_that_is_not_there_is_refused(mirotwin, tmp_path):
     path = tmp_path / "faults.stream"
     path.write_text(STREAM.replace("*@0/0 rxd", "*@0/2 rxd"))
     assert "tick 3200001: no robot in slot 2; there is 0" in mirotwin.refuses("replay", path)
+
+
+def test_the_exported_stream_of_a_recording_has_its_faults(mirotwin, tmp_path):
+    (tmp_path / "faults.stream").write_text(STREAM)
+    mirotwin.succeeds("replay", tmp_path / "faults.stream", "--out", tmp_path / "run", "-q")
+    mirotwin.succeeds("export", tmp_path / "run", "--out", tmp_path / "again.stream")
+    text = (tmp_path / "again.stream").read_text()
+    assert text.startswith("# mirotwin stream 3\n")
+    assert re.findall(r"\d+ \*.*", text) == re.findall(r"\d+ \*.*", STREAM)
+    mirotwin.succeeds("export", tmp_path / "run", "--out", tmp_path / "other.stream", "--network", "0")
+    assert (tmp_path / "other.stream").read_text() == text
