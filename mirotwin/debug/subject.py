@@ -93,7 +93,7 @@ def open_subject(
         subject = _file_below(subject)
         options = msgspec.structs.replace(options, subject=subject)
     verdict = None
-    run, failed = _open_steps(options) or (open_run(options), [])
+    run, failed, step_tick = _open_steps(options) or (open_run(options), [], -1)
     if options.resume is not None:
         _resume(run, options.resume)
     images = load_images(options.lines_from, run.image)
@@ -115,6 +115,9 @@ def open_subject(
             notes += verdict.texts
             if verdict.failures:
                 _stand_at(timeline, verdict.failures[0], options.slot)
+        if step_tick >= 0 and (verdict is None or not verdict.failures):
+            why = "case"
+            timeline.go_to(step_tick)
         if options.at is not None:
             why = debugger.go_to(options.at.ticks(run.tick_hz))
     return debugger, notes, why
@@ -132,8 +135,8 @@ def _file_below(folder: str) -> str:
     return streams[0] if streams else folder
 
 
-def _open_steps(options: DebugSubject) -> tuple[InspectedRun, list[str]] | None:
-    """The case of a scenario whose steps fail, and what failed; None for any other subject.
+def _open_steps(options: DebugSubject) -> tuple[InspectedRun, list[str], int] | None:
+    """The case of a scenario whose steps fail, what failed, and its tick (else -1); None for any other subject.
 
     Of robots also the input of steps that pass: nothing else can repeat it.
     """
@@ -152,7 +155,8 @@ def _open_steps(options: DebugSubject) -> tuple[InspectedRun, list[str]] | None:
         case = run.case_of_step()
         run.drive(move=run.player.finish)
         run.finish()
-    failed = run.result().lines
+    result = run.result()
+    failed = result.lines
     if not failed and isinstance(text, BoardText):
         return None  # a script of them is run
     case = case or (run.case() if run.failures else run.stream())
@@ -163,7 +167,7 @@ def _open_steps(options: DebugSubject) -> tuple[InspectedRun, list[str]] | None:
         given = msgspec.structs.replace(
             options, subject=path, firmware=str(image.path), seed=None, settings=()
         )
-        return open_run(given), [*failed]
+        return open_run(given), [*failed], result.step_tick
 
 
 def _newer_sources(symbols: Symbols) -> list[str]:

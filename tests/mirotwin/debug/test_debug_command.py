@@ -1,6 +1,7 @@
 """`mirotwin debug`: what it takes, what it prints, and how it refuses."""
 
 import os
+import re
 import shutil
 from pathlib import Path
 
@@ -308,6 +309,15 @@ wait_for = "command"
 name = "RDSIGS"
 within_ms = 50
 """
+
+
+def test_it_stands_where_a_wait_expired_that_no_check_can_repeat(mirotwin, tmp_path):
+    scenario = tmp_path / "wheels.scenario.toml"
+    wait = 'wait_for = "wheels"\nleft_m_s = 0.6\nright_m_s = 0.6\nwithin_ms = 150\n'
+    scenario.write_text(f'scenario = "silent"\nduration_s = 0.3\n[[step]]\npause_ms = 5\n[[step]]\n{wait}')
+    out = mirotwin.succeeds("debug", scenario, "-x", "where")
+    assert "step failed: step 2: wait_for wheels: tick 3720000" in out
+    assert re.search(r"\n0\.15500\d\ds  case: ", out)
 
 
 def test_a_scenario_with_steps_stands_at_the_step_that_fails_and_test_says_the_line(mirotwin, tmp_path):
