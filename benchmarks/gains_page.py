@@ -45,8 +45,6 @@ def write(results: Results, executor: Executor, path: Path | None) -> None:
 HEAD = """\
 # Many searches for gains of each law
 
-Which of two laws is better after the same search for their gains.
-
 {verdict}
 
 The paper prints no gains, and the shipped ones come from searches of different kinds. Here both laws get {repeats}
@@ -176,7 +174,7 @@ def _verdict_lines(pairs: Sequence[Row]) -> Iterator[str]:
     yield from table("camera", *(measure.name for measure in MEASURES))
     for camera in dict.fromkeys(row[0] for row in pairs):
         won = [wins([row for row in pairs if row[0] == camera], measure) for measure in MEASURES]
-        yield f"| {camera} | {' | '.join(f'{one[PAPER.name]} / {one[RETUNED.name]}' for one in won)} |"
+        yield f"| {camera} | {' | '.join(f'{one[PAPER.name]}/{one[RETUNED.name]}' for one in won)} |"
 
 
 def _median_lines(found: StoredTables) -> Iterator[str]:
@@ -187,7 +185,7 @@ def _median_lines(found: StoredTables) -> Iterator[str]:
     end = [row for row in found.rows("spread") if row[names.index("sets")] == found.about["sets at the end"]]
     for camera, path in dict.fromkeys((row[0], row[2]) for row in end):
         both = [row for row in end if (row[0], row[2]) == (camera, path)]
-        cells = [" / ".join(row[column].partition(" ")[0] for row in both) for column in columns]
+        cells = ["/".join(row[column].partition(" ")[0] for row in both) for column in columns]
         settled = both[0][columns[0]].rpartition(" ")[2]
         yield f"| {camera} | {path} | {cells[0]} of {settled} | {' | '.join(cells[1:])} |"
 
@@ -196,7 +194,7 @@ def _one_set_lines(found: StoredTables) -> Iterator[str]:
     rows = found.rows("one set, verdicts")
     measures = list(dict.fromkeys(row[1] for row in rows))
     yield from table("camera", *measures)
-    medians = {(row[0], row[1]): f"{row[2]} / {row[3]}" for row in rows}
+    medians = {(row[0], row[1]): f"{row[2]}/{row[3]}" for row in rows}
     for camera in dict.fromkeys(row[0] for row in rows):
         yield f"| {camera} | {' | '.join(medians[camera, measure] for measure in measures)} |"
 

@@ -383,7 +383,7 @@ def test_the_counts_of_the_verdicts_are_those_of_the_pairs():
         for column, (measure, cell) in enumerate(zip(MEASURES, cells, strict=True)):
             texts = [row[3 + column] for row in pairs if row[0] == camera]
             wins = [len([one for one in texts if one.endswith(f": {law}")]) for law in LAWS]
-            assert cell == f"{wins[0]} / {wins[1]}"
+            assert cell == f"{wins[0]}/{wins[1]}"
             won[measure.name] = [sum(both) for both in zip(won[measure.name], wins, strict=True)]
             for one in texts:
                 share, _, winner = one.partition(": ")
