@@ -51,8 +51,16 @@ def test_a_rooms_page_shows_its_map_and_draws_what_comes_in_and_goes_out(package
     assert "```text\n" in text
 
 
-def test_each_map_is_of_a_package_of_today():
+def test_each_map_is_of_a_package_of_today_and_is_shown():
     assert {*rooms.MAPS.glob("*.svg")} == {rooms.file_of(package) for package in rooms.packages()}
+    for package in imports.PACKAGES:
+        pages = [rooms.MAPS / "ways.md"]
+        pages += [
+            page
+            for page in [imports.PACKAGES[package].parent / "README.md"]
+            if package != "mirotwin" and page.is_file()
+        ]
+        assert all(f"{rooms.file_of(package).name})" in page.read_text("utf-8") for page in pages), package
 
 
 def test_imports_for_types_alone_are_left_out_and_commands_are_found_by_their_texts():
