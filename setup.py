@@ -99,7 +99,7 @@ def package_dirs():
 
 
 def pure():
-    """Whether nothing is to be compiled."""
+    """True if nothing is to be compiled."""
     wanted = os.environ.get("MIROTWIN_PURE", "")
     if wanted not in ("", "0", "1"):
         sys.exit(f"MIROTWIN_PURE={wanted}: give 1 (compile nothing), 0, or unset it")
@@ -181,11 +181,11 @@ def constants(c):
     numbers = {}
     for setting in SETTING.finditer(c):
         name, value = setting.groups()
-        if name in declared and times[name] == 1 and (found := number(c, setting.start(), value)):
-            numbers[name] = found
+        if name in declared and times[name] == 1 and (literal := number(c, setting.start(), value)):
+            numbers[name] = literal
     c = SETTING.sub(lambda setting: "" if setting[1] in numbers else setting[0], c)
     return DECLARED.sub(
-        lambda one: f"static {one[1]} const {one[2]} = {numbers[one[2]]};\n" if one[2] in numbers else one[0],
+        lambda m: f"static {m[1]} const {m[2]} = {numbers[m[2]]};\n" if m[2] in numbers else m[0],
         c,
     )
 

@@ -27,11 +27,11 @@ def names_of_stub(package):
     @cache
     def places():
         text = Path(sys.modules[package].__file__).with_suffix(".pyi").read_text(encoding="utf-8")
-        found = {name: (module, inner) for module, inner, name in re.findall(IMPORTED, text, re.MULTILINE)}
+        origins = {name: (module, inner) for module, inner, name in re.findall(IMPORTED, text, re.MULTILINE)}
         for name, of, inner in re.findall(SET, text, re.MULTILINE):
-            module, submodule = found[of]
-            found[name] = f"{module.rstrip('.')}.{submodule}", inner
-        return {name: found[name] for name in sorted(found) if not name.startswith("_")}
+            module, submodule = origins[of]
+            origins[name] = f"{module.rstrip('.')}.{submodule}", inner
+        return {name: origins[name] for name in sorted(origins) if not name.startswith("_")}
 
     def loaded(name):
         if name == "__all__":

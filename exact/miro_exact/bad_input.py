@@ -18,11 +18,11 @@ class BadInput(ValueError):
     """
 
     def __init__(
-        self, path: str | PathLike[str], place: str | int | tuple[int, int], what: str, remedy: str = ""
+        self, path: str | PathLike[str], place: str | int | tuple[int, int], problem: str, remedy: str = ""
     ) -> None:
         self.path = path
         self.place = place
-        self.what = what
+        self.what = problem
         self.remedy = remedy
         head = f"{path}"
         if isinstance(place, tuple):
@@ -31,7 +31,7 @@ class BadInput(ValueError):
             head += f":{place}" if place else ""
         else:
             head = ": ".join(part for part in (head, shortened(place)) if part)
-        text = ": ".join(part for part in (head, shortened(what)) if part)
+        text = ": ".join(part for part in (head, shortened(problem)) if part)
         super().__init__(one_line(f"{text}; {shortened(remedy)}" if remedy else text))
 
     def __reduce__(self) -> tuple[Any, ...]:
@@ -56,9 +56,9 @@ def did_you_mean(word: str, known: Iterable[str], remedy: str = "") -> str:
     """The remedy for a word that is not among the known ones: the nearest of them, if one is near, and `remedy`."""
     from difflib import get_close_matches  # only an error needs it
 
-    spelt = {one.lower(): one for one in known}
+    spelt = {name.lower(): name for name in known}
     close = get_close_matches(word[:LONGEST_END].lower(), spelt, n=1)
-    return " ".join([*(f"did you mean {spelt[one]}?" for one in close), *([remedy] if remedy else [])])
+    return " ".join([*(f"did you mean {spelt[name]}?" for name in close), *([remedy] if remedy else [])])
 
 
 def one_line(text: str) -> str:

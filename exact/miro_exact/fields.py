@@ -241,7 +241,9 @@ class Row(Kind):
         if "s" not in self.form:
             self.layout = struct.Struct(f"<{self.form}")
         self.reals = [index for index, kind in enumerate(kinds) if kind[0] == "d"]
-        self.bounded = [(index, *one.bounds) for index, one in enumerate(self.columns) if one.bounds]
+        self.bounded = [
+            (index, *bounded.bounds) for index, bounded in enumerate(self.columns) if bounded.bounds
+        ]
 
     def encode(self, value: Any) -> bytes:
         cells = value if self.split is None else self.split(value)

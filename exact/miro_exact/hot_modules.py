@@ -92,5 +92,5 @@ def compiled_file(source: Path) -> Path | None:
 
 
 def dispatch_replicated(modules: Iterable[Path]) -> bool:
-    """Whether one of these compiled modules has an interpreter loop with the dispatch at the end of each arm."""
+    """True if one of these compiled modules has an interpreter loop with the dispatch at the end of each arm."""
     return any(DISPATCH_MARK in module.read_bytes() for module in modules)

@@ -123,7 +123,7 @@ def encoding_of(data: bytes, whole: bool = True) -> tuple[str, int]:
     with suppress(UnicodeDecodeError):
         codecs.getincrementaldecoder("utf-8")().decode(data, whole)
         return "utf-8", 0
-    lengths = [len(found) for found in _NON_ASCII.findall(data)]
+    lengths = [len(run) for run in _NON_ASCII.findall(data)]
     odd = [length for length in lengths if length & 1]
     return ("gb18030" if 2 * len(odd) < len(lengths) else "cp1252"), 0
 

@@ -52,10 +52,12 @@ def _registered(group: str, paths: tuple[tuple[str, int], ...]) -> tuple[EntryPo
 
 
 def _may_register(path: str) -> bool:
-    """Whether a distribution there may have entry points for us; so it may in what is no folder, as a zip file is."""
+    """True if a distribution there may have entry points for us; so it may in what is no folder, as a zip file is."""
     try:
         with os.scandir(path or ".") as children:
-            folders = [one.path for one in children if one.name.lower().endswith((".dist-info", "egg-info"))]
+            folders = [
+                child.path for child in children if child.name.lower().endswith((".dist-info", "egg-info"))
+            ]
     except NotADirectoryError:
         return True
     except OSError:
@@ -159,8 +161,8 @@ def _files(name: str, path: Path) -> dict[str, Path]:
         return {name: path}
     listed = {}
     for folder, folders, files in os.walk(path):
-        folders[:] = [one for one in folders if one != "__pycache__" and not one.startswith(".")]
-        for file in (Path(folder, one) for one in files if not one.startswith(".")):
+        folders[:] = [entry for entry in folders if entry != "__pycache__" and not entry.startswith(".")]
+        for file in (Path(folder, entry) for entry in files if not entry.startswith(".")):
             if file.is_file() and not file.name.endswith((".pyc", "~")):
                 listed[f"{name}/{file.relative_to(path).as_posix()}"] = file
     return listed

@@ -67,7 +67,7 @@ def defined_at(function: Any) -> str:
 
 
 def _foreign(frame: FrameType) -> bool:
-    """Whether it is neither our code nor Python's."""
+    """True if it is neither our code nor Python's."""
     module = frame.f_globals.get("__name__", "")
     if _is_ours(module) or module.partition(".")[0] in _LOADERS:
         return False

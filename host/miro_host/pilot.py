@@ -181,10 +181,10 @@ def _failure(word: str, plugin: Law[Any] | Estimator[Any], error: BaseException)
     known = type(error) in (ValueError, DomainError)
     reason = str(error) if known else described(error)
     place = raised_at(error) or defined_at(plugin.step)
-    what = f"{word} {plugin.parameters.name()!r} failed: {at_place(reason, place)}"
+    problem = f"{word} {plugin.parameters.name()!r} failed: {at_place(reason, place)}"
     if isinstance(error, DomainError):
-        return PluginError(what, "the parameters are far outside those of a real robot")
-    return PluginError(what, f"mend the {word} or its parameters")
+        return PluginError(problem, "the parameters are far outside those of a real robot")
+    return PluginError(problem, f"mend the {word} or its parameters")
 
 
 def check_answer(answer: object, inner: tuple[str, ...]) -> None:

@@ -69,11 +69,11 @@ class TelemetryReceiver:
 
         What is no answer of a robot here changes nothing in `last`.
         """
-        found = self.decoder.feed_symbols(symbols)
-        for event in found:
+        events = self.decoder.feed_symbols(symbols)
+        for event in events:
             if isinstance(event, Received):
                 self._take(event)
-        return found
+        return events
 
     def _take(self, event: Received) -> None:
         try:

@@ -46,7 +46,7 @@ def _of_folder(path: Path, network: int) -> Iterator[Still]:
         raise BadInput(path, "", "holds no .png and no .ppm", "give a folder of pictures, or a run.mcap")
     networks = {name: _OF_NETWORK.fullmatch(name) for name in names}
     if all(networks.values()):
-        names = [name for name, found in networks.items() if found is not None and int(found[1]) == network]
+        names = [name for name, match in networks.items() if match is not None and int(match[1]) == network]
         if not names:
             raise BadInput(path, f"--network {network}", "no picture of it", "name one of the files'")
     for number, name in enumerate(names):

@@ -55,12 +55,12 @@ class _AllBranched(Exception):
 
 def failure_of(run: Run, name: str = "") -> Failure | None:
     """The first failure of that check, or of any."""
-    failures = [one for group in run.judges for one in group.failures if name in ("", one.check)]
-    return min(failures, key=lambda one: one.tick, default=None)
+    failures = [failure for group in run.judges for failure in group.failures if name in ("", failure.check)]
+    return min(failures, key=lambda failure: failure.tick, default=None)
 
 
 def has_failed(run: Run, name: str) -> bool:
-    """Whether that check failed; or a step, if that is what failed."""
+    """True if that check failed; or a step, if that is what failed."""
     if name == STEP:
         return run.player is not None and run.player.failure is not None
     return failure_of(run, name) is not None

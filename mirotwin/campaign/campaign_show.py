@@ -147,7 +147,7 @@ def _compare(rows: ResultRows, text: str, metrics: Sequence[str], as_json: bool)
     if not pairs:
         reason = f"no run with {first} has a twin with {second}"
         raise BadInput(rows.path, "--between", reason, "the campaign has to be complete")
-    compared = [one for one, _ in differences(metrics, rows, rows, pairs)]
+    compared = [difference for difference, _ in differences(metrics, rows, rows, pairs)]
     if as_json:
         _print_json({"factor": name, "first": first, "second": second, "differences": compared})
         return DONE

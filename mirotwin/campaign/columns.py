@@ -83,8 +83,11 @@ class _Run:
         return tracking_of([sample for sample in self.first.measured_errors if sample.tick > after_tick])
 
     def worst_rms_position_cm(self) -> float | None:
-        everyone = [one.tracking for one in self.summary.robots] or [self.summary.tracking]
-        return max((one.rms_position_cm for one in everyone if one.rms_position_cm is not None), default=None)
+        everyone = [robot.tracking for robot in self.summary.robots] or [self.summary.tracking]
+        return max(
+            (tracking.rms_position_cm for tracking in everyone if tracking.rms_position_cm is not None),
+            default=None,
+        )
 
 
 _Column: TypeAlias = tuple[type, Callable[[_Run], Any]]

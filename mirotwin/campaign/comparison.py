@@ -60,7 +60,7 @@ class MetricDifference(msgspec.Struct, frozen=True):
     lower: int
 
     def worse(self, tolerance: float = 0.0) -> bool:
-        """Whether the second is worse by more than this share of the first's mean."""
+        """True if the second is worse by more than this share of the first's mean."""
         if self.metric in COUNTED:
             return self.higher > self.lower
         if self.interval is None:

@@ -145,7 +145,7 @@ class Design(msgspec.Struct, frozen=True):
             levels.append(factor.levels[level])
         run_seed = self.first_seed + seed
         draw_seed = self.draw_seed if self.draw_count else run_seed
-        drawn = tuple(one.value(draw_seed, draw) for one in self.draws)
+        drawn = tuple(source.value(draw_seed, draw) for source in self.draws)
         return DesignPoint(tuple(reversed(levels)), drawn, draw, run_seed)
 
     def settings(self, point: DesignPoint) -> tuple[str, ...]:

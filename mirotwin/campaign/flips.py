@@ -78,7 +78,7 @@ def classes(rows: ResultRows) -> dict[str, Counter[str]]:
     without = {key: row for row, key in enumerate(keys) if flips[row] == NONE}
     columns = {name: rows.column(name) for name in FIGURES if name in rows.table.column_names}
     verdicts, failures = rows.column("verdict"), rows.column("failure")
-    found: dict[str, Counter[str]] = {}
+    by_place: dict[str, Counter[str]] = {}
     for row, flip in enumerate(flips):
         other = without.get(keys[row])
         if flip == NONE or other is None:
@@ -93,15 +93,17 @@ def classes(rows: ResultRows) -> dict[str, Counter[str]]:
             now, before = (columns[_POSITION][place] for place in (row, other))
             near = now is not None and before is not None and abs(now - before) < NEAR_CM
             kind = "within 1 mm" if near else "moves otherwise"
-        found.setdefault(flip.rsplit(" ", 4)[0], Counter())[kind] += 1
-    return dict(sorted(found.items(), key=lambda one: (*(-one[1][kind] for kind in CLASSES[:2:-1]), one[0])))
+        by_place.setdefault(flip.rsplit(" ", 4)[0], Counter())[kind] += 1
+    return dict(
+        sorted(by_place.items(), key=lambda item: (*(-item[1][kind] for kind in CLASSES[:2:-1]), item[0]))
+    )
 
 
 def classes_table(rows: ResultRows) -> Table:
     """The classes of all flips, then of each variable."""
-    found = classes(rows)
+    by_place = classes(rows)
     table = plain_table("variable", right=("flips", *CLASSES))
-    total: Counter[str] = sum(found.values(), Counter())
-    for name, counts in {"all": total, **found}.items():
+    total: Counter[str] = sum(by_place.values(), Counter())
+    for name, counts in {"all": total, **by_place}.items():
         table.add_row(name, f"{counts.total()}", *(f"{counts[kind]}" for kind in CLASSES))
     return table

@@ -28,17 +28,17 @@ def arm_line(about: ResultsInfo, levels: Mapping[str, Any]) -> str:
         return ""
     scenario, firmware, settings = about.scenario, about.firmware, list(about.settings)
     for name, known in zip(about.factors, about.levels, strict=True):
-        level = next((one for one in known if one.value == levels[name]), None)
+        level = next((candidate for candidate in known if candidate.value == levels[name]), None)
         if level is None:
             return ""
         scenario, firmware = level.scenario or scenario, level.firmware or firmware
         settings += level.settings
-    expected = [one for one in settings if one.startswith(EXPECT)]
+    expected = [setting for setting in settings if setting.startswith(EXPECT)]
     return RunOptions(
         scenario=scenario,
         firmware=firmware or None,
-        settings=tuple(one for one in settings if one not in expected),
-        expected=tuple(one.removeprefix(EXPECT) for one in expected),
+        settings=tuple(setting for setting in settings if setting not in expected),
+        expected=tuple(setting.removeprefix(EXPECT) for setting in expected),
     ).command_line()
 
 
@@ -111,13 +111,17 @@ def _comparisons(rows: ResultRows, made: dict[str, Any]) -> list[dict[str, Any]]
             if not pairs or len(comparisons) == MOST_COMPARISONS:
                 continue
             compared = differences(judged(rows), rows, rows, pairs)
-            drawn = [(one, numbers) for one, numbers in compared if one.metric in shown(rows)]
+            drawn = [
+                (difference, numbers) for difference, numbers in compared if difference.metric in shown(rows)
+            ]
             figure = ""
-            if any(one.first and one.interval for one, _ in drawn):
+            if any(difference.first and difference.interval for difference, _ in drawn):
                 figure = f"plot-pairs-{len(comparisons)}"
                 made[figure] = apart(drawn)
             levels = {"factor": factor, "first": first, "second": second, "pairs": len(pairs)}
-            comparisons.append({**levels, "differences": [one for one, _ in compared], "figure": figure})
+            comparisons.append(
+                {**levels, "differences": [difference for difference, _ in compared], "figure": figure}
+            )
     return comparisons
 
 

@@ -97,7 +97,10 @@ class Plan(msgspec.Struct, frozen=True):
             [image.sha256 for _, image in sorted(self.images.items())],
             self.settings,
             replace(design, factors=()),
-            [(one.name, [(level.value, level.settings) for level in one.levels]) for one in design.factors],
+            [
+                (factor.name, [(level.value, level.settings) for level in factor.levels])
+                for factor in design.factors
+            ],
             self.checks,
             *([self.values] if self.values else []),
         )
@@ -203,8 +206,8 @@ def _figures(plan: Plan, text: AnyText, steps: Sequence[Step], job: Work) -> dic
         figures |= {step_column(step.number): float for step in steps if isinstance(step, WaitStep)}
     if plan.values:
         if not isinstance(text, BoardText):
-            what = f"are of a board's parts, and {text.origin} is for robots"
-            raise BadInput(plan.path, "values", what, "leave them out")
+            problem = f"are of a board's parts, and {text.origin} is for robots"
+            raise BadInput(plan.path, "values", problem, "leave them out")
         with BadInput.at(plan.path, "values"), plain_parameters(text.origin):
             figures |= _kinds_of_values(RunSpec.of(text, image_of(job.firmware)).world(), plan.values)
     return figures
@@ -228,7 +231,7 @@ def _tried_points(design: Design) -> Iterator[DesignPoint]:
     """The first level of all, and each other level and end of a range with the first ones of the others."""
     tried: list[Sequence[Any]] = [factor.levels for factor in design.factors]
     tried += [draw.ends() for draw in design.draws]
-    points = [[one[0] for one in tried]]
+    points = [[trial[0] for trial in tried]]
     for index, others in enumerate(tried):
         points += [[*points[0][:index], other, *points[0][index + 1 :]] for other in others[1:]]
     for point in points:
@@ -252,10 +255,10 @@ def _scenarios(plan: Plan) -> dict[str, AnyText]:
         except BadInput as error:
             raise BadInput(plan.path, place, f"{error}") from None
         if type(texts[name]) is not type(texts[plan.scenario]):
-            what = (
+            problem = (
                 f"of {name} and {plan.scenario} one is for a board and one for robots, whose columns differ"
             )
-            raise BadInput(plan.path, place, what, "make a campaign of each")
+            raise BadInput(plan.path, place, problem, "make a campaign of each")
     return texts
 
 

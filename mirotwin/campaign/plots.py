@@ -39,7 +39,10 @@ def spread(metric: str, arms: Sequence[tuple[Arm, Numbers]]) -> Any:
     _dots(made, [(label, numbers) for label, (_, numbers) in zip(labels, arms, strict=True)])
     _widen(made, LEAST.get(metric, 0.0), *(numbers for _, numbers in arms))
     quantiles = [figures.quantiles for arm, _ in arms if (figures := arm.metrics[metric]) is not None]
-    shares = {share: [one[share] for one in quantiles] for share in ("0.05", "0.25", "0.5", "0.75", "0.95")}
+    shares = {
+        share: [quantile[share] for quantile in quantiles]
+        for share in ("0.05", "0.25", "0.5", "0.75", "0.95")
+    }
     source = ColumnDataSource({"arm": labels, **shares})
     whisker = made.segment(x0="0.05", x1="0.95", y0="arm", y1="arm", source=source, line_width=1.4)
     tagged(whisker.glyph, line_color="ink")
@@ -54,21 +57,25 @@ def spread(metric: str, arms: Sequence[tuple[Arm, Numbers]]) -> Any:
 
 def apart(compared: Sequence[tuple[MetricDifference, Numbers]]) -> Any:
     """Differences in per cent of the first one's mean: each pair a dot, the mean with its interval."""
-    shown = [(one, numbers) for one, numbers in compared if one.first and one.interval is not None]
-    labels = [one.metric for one, _ in shown]
+    shown = [
+        (difference, numbers)
+        for difference, numbers in compared
+        if difference.first and difference.interval is not None
+    ]
+    labels = [difference.metric for difference, _ in shown]
     made = _rows("difference, % of the first's mean", labels)
     made.add_layout(tagged(Span(location=0.0, dimension="height", line_width=1.2), line_color="ink"))
-    scale = [100.0 / abs(one.first) for one, _ in shown]
+    scale = [100.0 / abs(difference.first) for difference, _ in shown]
     numbers = [each * by for (_, each), by in zip(shown, scale, strict=True)]
     _dots(made, list(zip(labels, numbers, strict=True)))
     _widen(made, LEAST_PERCENT, [0.0], *numbers)
-    intervals = [one.interval for one, _ in shown if one.interval is not None]
+    intervals = [difference.interval for difference, _ in shown if difference.interval is not None]
     source = ColumnDataSource(
         {
             "arm": labels,
-            "low": [one.low * by for one, by in zip(intervals, scale, strict=True)],
-            "high": [one.high * by for one, by in zip(intervals, scale, strict=True)],
-            "mean": [one.difference * by for (one, _), by in zip(shown, scale, strict=True)],
+            "low": [difference.low * by for difference, by in zip(intervals, scale, strict=True)],
+            "high": [difference.high * by for difference, by in zip(intervals, scale, strict=True)],
+            "mean": [difference.difference * by for (difference, _), by in zip(shown, scale, strict=True)],
         }
     )
     interval = made.hbar(

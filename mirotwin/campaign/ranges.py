@@ -36,7 +36,7 @@ class Choice(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
 
 
 def is_range(value: Any) -> bool:
-    """Whether this stands for a range, and not for keys below it."""
+    """True if this stands for a range, and not for keys below it."""
     return not isinstance(value, dict) or any(key in value for key in ("from", "to", CHOOSE))
 
 

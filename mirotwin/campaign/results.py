@@ -112,11 +112,13 @@ def write(plan: Plan, journal: Path, results: Path) -> None:
         pq.ParquetWriter(wall_file, wall, compression="zstd") as walls,
     ):
         count = 0
-        ordered = in_order(one for one, _ in outcomes(journal))
+        ordered = in_order(outcome for outcome, _ in outcomes(journal))
         while group := list(islice(ordered, ROWS)):
             count += len(group)
-            rows.write_table(_table([_row(plan, one) for one in group], schema))
-            walls.write_table(_table([{"run": one.run, "wall_s": one.wall_s} for one in group], wall))
+            rows.write_table(_table([_row(plan, outcome) for outcome in group], schema))
+            walls.write_table(
+                _table([{"run": outcome.run, "wall_s": outcome.wall_s} for outcome in group], wall)
+            )
         if count != plan.runs:
             reason = f"has the outcome of {count} of {plan.runs} runs: it was changed while the campaign went"
             raise OutputError(

@@ -72,14 +72,16 @@ class ResultRows:
 
     @property
     def alone(self) -> bool:
-        """Whether the runs are those of boards."""
+        """True if the runs are those of boards."""
         return "to_board" in self.table.column_names
 
     def metrics(self) -> list[str]:
         """All that `numbers` knows; results of another version may have fewer."""
         others = {*OWN, *self.varied, *NOT_FIGURES, *(CHECK + name for name in self.about.checks)}
         figures = [
-            one.name for one in self.table.schema if one.name not in others and f"{one.type}" != "string"
+            field.name
+            for field in self.table.schema
+            if field.name not in others and f"{field.type}" != "string"
         ]
         unsettled = [] if self.alone else [UNSETTLED]
         return [*figures, *SHARES, *unsettled, *(CHECK + name for name in self.about.checks)]
@@ -106,7 +108,7 @@ class ResultRows:
         elif name == UNSETTLED:
             values = [None if settled is None else not settled for settled in self.column("settled")]
         elif name.startswith(CHECK):
-            values = [None if one is None else one == "failed" for one in self.column(name)]
+            values = [None if value is None else value == "failed" for value in self.column(name)]
         else:
             values = self.column(name)
         try:

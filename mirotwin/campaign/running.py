@@ -76,7 +76,7 @@ def run(
 
 
 def _complete(results: Path, plan: Plan) -> bool:
-    """Whether the results are there. Raises BadInput for a file of another campaign, and where none can be written."""
+    """True if the results are there. Raises BadInput for a file of another campaign, and where none can be written."""
     if results.suffix != ".parquet":
         raise BadInput(results, "", "results are a .parquet file", f"write --out {results.stem}.parquet")
     if not results.exists():

@@ -119,7 +119,7 @@ def _failure(run: Run, result: Result) -> str:
     if run.player is not None and run.player.failure is not None:
         return f"step: {run.player.failure}"
     if result.failures:
-        return f"{min(result.failures, key=lambda one: one.tick)}"
+        return f"{min(result.failures, key=lambda failure: failure.tick)}"
     return "; ".join(text for verdict, text in result.said if verdict == "not judged")
 
 

@@ -169,12 +169,12 @@ def _failed(run: Run, options: WhyOptions) -> tuple[str, int]:
 
 def _two_branches(spec: RunSpec, name: str, curve: Curve, seeds: list[int]) -> dict[str, str]:
     """A branch that fails and one that does not, of the last moment at which there were both, as stream files."""
-    before = [one for one in curve.points if one.tick <= curve.jump_tick]
-    both = [one for one in before if 0 < one.count < len(seeds)] or curve.points
+    before = [point for point in curve.points if point.tick <= curve.jump_tick]
+    both = [point for point in before if 0 < point.count < len(seeds)] or curve.points
     streams: dict[str, str] = {}
     expect: dict[str, object] = {}
     for file, fails in ((FAILS, True), (PASSES, False)):
-        point = next((one for one in reversed(both) if fails in one.failed), None)
+        point = next((each for each in reversed(both) if fails in each.failed), None)
         if point is None:
             continue
         run = Run.traced(branch(spec, point.tick, seeds[point.failed.index(fails)])).play()

@@ -48,8 +48,8 @@ class Curve(msgspec.Struct, frozen=True, kw_only=True):
         end_tick = self.jump_tick + self.period
         shares = f"from {self.at(self.jump_tick).share:.2f} to {self.at(end_tick).share:.2f}"
         when = f"{seconds(self.jump_tick, clock)} to {seconds(end_tick, clock)}"
-        certain = next((one for one in reversed(self.points) if one.share < 1.0), first)
-        after = next((one.tick for one in self.points if one.tick > certain.tick), None)
+        certain = next((point for point in reversed(self.points) if point.share < 1.0), first)
+        after = next((point.tick for point in self.points if point.tick > certain.tick), None)
         sure = "" if after is None else f"; all branches fail from {seconds(after, clock)} on"
         return [f"fails: {self.what}", f"decided in control period {self.low}, {when}: {shares}{sure}", start]
 
@@ -64,7 +64,7 @@ def seconds(tick: int, clock: int) -> str:
 
 def cells(curve: Curve) -> list[tuple[str, ...]]:
     """The rows of the table: the moments in their order, then the runs of other seeds."""
-    named = [(seconds(one.tick, curve.clock), one) for one in curve.points]
+    named = [(seconds(moment.tick, curve.clock), moment) for moment in curve.points]
     rows: list[tuple[str, ...]] = []
     for name, point in (*named, (OTHERS, curve.others)):
         low, high = point.interval
@@ -94,7 +94,7 @@ def page(curve: Curve, commands: Sequence[str]) -> bytes:
     rows = "".join(
         f"<tr>{''.join(f'<td>{escape(cell)}</td>' for cell in row)}</tr>\n" for row in cells(curve)
     )
-    found = "".join(f"<p>{escape(line)}</p>\n" for line in curve.lines())
+    paragraphs = "".join(f"<p>{escape(line)}</p>\n" for line in curve.lines())
     style = (ASSETS / "page.css").read_text(encoding="utf-8")
     head = "".join(f"<th>{name}</th>" for name in COLUMNS)
     return f"""<!doctype html>
@@ -103,7 +103,7 @@ def page(curve: Curve, commands: Sequence[str]) -> bytes:
 <title>{escape(curve.run)}: when did it become inevitable?</title>
 <style>{style}</style></head><body><main class="wide">
 <h1>When did it become inevitable? {escape(curve.run)}</h1>
-{found}<figure>{drawing(curve).text()}</figure>
+{paragraphs}<figure>{drawing(curve).text()}</figure>
 <table><thead><tr>{head}</tr></thead><tbody>
 {rows}</tbody></table>
 <pre>{escape(chr(10).join(commands))}</pre>

@@ -46,7 +46,7 @@ class WorkerContext(SpawnContext):
         codes = [process.exitcode for process in self.started]
         if UNGUARDED in codes:
             raise BadInput("", "campaign.run", *GUARD)
-        if FAILED in codes and not any(one.done() and one.exception() is None for one in self.begun):
+        if FAILED in codes and not any(future.done() and future.exception() is None for future in self.begun):
             reason = "its processes import your script first, which fails in them for the reason above"
             raise BadInput("", "campaign.run", reason, GUARD[1])
 

@@ -71,10 +71,10 @@ class PortScript(TrialScript):
     def same(self, left: int, right: int) -> Pairs:
         return self.words() if self.standing else super().same(left, right)
 
-    def say(self, kind: int, payload: bytes, what: str, words: Pairs = (), **how: Unpack[How]) -> Frame:
+    def say(self, kind: int, payload: bytes, label: str, words: Pairs = (), **how: Unpack[How]) -> Frame:
         """Sends a frame that a PC can send; lets the frame's time pass without it otherwise."""
         before = len(self.sent)
-        frame = super().say(kind, payload, what, words, **how)
+        frame = super().say(kind, payload, label, words, **how)
         if "bad_stop" in how or any(pause < SHORTEST_US for pause in how.get("pauses", {}).values()):
             del self.sent[before:]
         elif how.get("fresh", True):
@@ -136,7 +136,9 @@ def _try(rule: Rule, port: RobotPort, topology: Topology) -> tuple[Failure | Non
 
     @script.expects(last.end_tick, f"{amount(fresh, 'frame')} accepted by {last.what}", by_answers=True)
     def counted(observed: Observed) -> Found:
-        answers = [one.content for one in observed.answers if one.frame.seq == last.seq and one.content]
+        answers = [
+            answer.content for answer in observed.answers if answer.frame.seq == last.seq and answer.content
+        ]
         accepted = f"{answers[-1].accepted}" if answers else "no answer"
         if accepted != f"{fresh}":
             yield observed.end_tick, accepted
@@ -171,7 +173,7 @@ def _try(rule: Rule, port: RobotPort, topology: Topology) -> tuple[Failure | Non
 
 
 def _in_turn_of_another(frame: Received, topology: Topology, there: Sequence[int]) -> bool:
-    """Whether another robot at the port may send this."""
+    """True if another robot at the port may send this."""
     answer = answer_of(frame)
     others = (slot for slot in there if slot not in topology.slots)
     return answer is not None and answer.slot in others and answer.slot == answer.seq % topology.robots

@@ -23,7 +23,7 @@ from mirotwin.verify.cases.replay_line import DebugLineOptions
 
 
 def counts(outcome: Outcome, named: bool, known: Mapping[str, str]) -> bool:
-    """Whether its verdict counts for the exit code.
+    """True if its verdict counts for the exit code.
 
     Neither the failure of a `known` rule does, nor a rule behind another that failed. "Not judged" counts only for a
     rule that the user `named`.
@@ -61,7 +61,7 @@ class RuleCases:
 
     @property
     def verdict(self) -> Verdict:
-        """That of all together. A firmware fault counts unless the rule against it is known to fail."""
+        """The verdict over all rules. A firmware fault counts unless the rule against it is known to fail."""
         known = {kind for id in self._known for kind in find(id).faults}
         faults = [fault for one in self._outcomes for _, _, fault in one.faults if fault.kind not in known]
         verdicts: list[Verdict] = ["fault"] * bool(faults)

@@ -37,7 +37,7 @@ def explain(rule: Rule, image: Image, seed: int = 0) -> tuple[list[str], int, in
     failed = faults = 0
     for listener in listen(trial, image, seed):
         subject = listener.subject
-        verdicts = [_verdict(one, listener.observed) for one in trial.expected_of(subject)]
+        verdicts = [_verdict(expected, listener.observed) for expected in trial.expected_of(subject)]
         bad = len([row for row in verdicts if row[1] == "FAILED"])
         board = subject.robot.board
         fault_rows = [(fault.tick, "fault", str(fault)) for fault in board.faults]
@@ -92,7 +92,7 @@ def _rows(observed: Observed) -> Iterator[Row]:
 
 def _sent(event: Event, decoder: Decoder, observed: Observed) -> str:
     receptions = decoder.hear(Transmission(event.tick, DOWN, event.data, event.network))
-    frames = [_frame(one, observed) for one in receptions if isinstance(one, Received)]
+    frames = [_frame(reception, observed) for reception in receptions if isinstance(reception, Received)]
     return ": ".join(filter(None, [event.data.hex(" "), "; ".join(frames)]))
 
 
@@ -114,7 +114,7 @@ def _command(event: Event, orders: Orders) -> str:
 
 
 def _characters(run: Sequence[Event]) -> str:
-    shown = " ".join(f"{one.value:02x}" + ("" if one.good_stop else "!") for one in run)
+    shown = " ".join(f"{character.value:02x}" + ("" if character.good_stop else "!") for character in run)
     return f"{amount(len(run), 'character')}, {between(run[0].tick, run[-1].tick)}: {shown}"
 
 

@@ -117,7 +117,9 @@ def _signed(byte: int) -> int:
 
 def characters(received: Sequence[Event]) -> str:
     """Characters that the PC received: how many, which, from when to when."""
-    shown = " ".join(f"{one.value:02X}" + ("" if one.good_stop else "!") for one in received[:24])
+    shown = " ".join(
+        f"{character.value:02X}" + ("" if character.good_stop else "!") for character in received[:24]
+    )
     more = " .." if len(received) > 24 else ""
     count = amount(len(received), "character")
     return f"{count}, {shown}{more} ({between(received[0].tick, received[-1].tick)})"
@@ -138,7 +140,7 @@ def between(begin_tick: int, end_tick: int) -> str:
 
 def no_answer(received: Sequence[Event], seq: int) -> str:
     """Why these characters are no answer to the question with this number."""
-    data = bytes(one.value for one in received)
+    data = bytes(character.value for character in received)
     begin = data.find(SYNC)
     if begin < 0:
         return "no sync 2D D4"
@@ -153,7 +155,10 @@ def no_answer(received: Sequence[Event], seq: int) -> str:
         return f"its HDR {begins:02X}h is not whitened"
     decoder = TelemetryDecoder()
     events = (
-        decoder.feed_symbols([(one.value, one.good_stop, one.tick) for one in received]) + decoder.flush()
+        decoder.feed_symbols(
+            [(character.value, character.good_stop, character.tick) for character in received]
+        )
+        + decoder.flush()
     )
     reasons = [event.reason for event in events if isinstance(event, Damaged)]
     return max(reasons).name.lower().replace("_", " ") if reasons else ""

@@ -30,7 +30,7 @@ T = TypeVar("T", Event, Order, "ReceivedAnswer")
 
 def within(items: Iterable[T], after_tick: int, until_tick: int) -> list[T]:
     """The items of `items` later than `after_tick` and not later than `until_tick`."""
-    return [one for one in items if after_tick < one.tick <= until_tick]
+    return [item for item in items if after_tick < item.tick <= until_tick]
 
 
 class ReceivedAnswer(msgspec.Struct, frozen=True):
@@ -133,9 +133,9 @@ class Observed:
     def read_positions(self, side: str, after_tick: int, until_tick: int) -> list[int]:
         """The low words of the real positions that the robot read in between."""
         return [
-            int.from_bytes(one.data[-2:], "big")
-            for one in within(self.commands, after_tick, until_tick)
-            if one.opcode == _RDRP and one.side == side
+            int.from_bytes(command.data[-2:], "big")
+            for command in within(self.commands, after_tick, until_tick)
+            if command.opcode == _RDRP and command.side == side
         ]
 
     def set_to(self, side: str, tick: int) -> Words | None:

@@ -82,8 +82,10 @@ def _other_layout(script: TrialScript) -> TrialScript:
 
 
 def _begins_again(listener: Listener) -> str:
-    """Whether the firmware has reset LM629s that it had ordered to turn. The trial resets no processor."""
-    turned_tick = min((one.tick for one in listener.observed.commands if one.opcode == _STT), default=None)
+    """True if the firmware has reset LM629s that it had ordered to turn. The trial resets no processor."""
+    turned_tick = min(
+        (command.tick for command in listener.observed.commands if command.opcode == _STT), default=None
+    )
     board = listener.subject.robot.board
     if turned_tick is None or board.left.reset_tick <= turned_tick:
         return ""
@@ -91,37 +93,37 @@ def _begins_again(listener: Listener) -> str:
 
 
 def _serial_port(events: Sequence[Event], frame: Frame) -> str:
-    sent = next(one.data for one in events if one.what == "sent")
+    sent = next(event.data for event in events if event.what == "sent")
     limit = frame.end_tick + TICKS_PER_MS
-    received = [one for one in events if one.what == "received" and one.tick <= limit]
+    received = [event for event in events if event.what == "received" and event.tick <= limit]
     if not received:
         return "its serial port takes no character: not set up, or off"
     if len(received) < len(sent):
         taken = f"{len(received)} of {amount(len(sent), 'character')}"
         return f"its serial port takes {taken}: RI stays set, or another bit rate"
-    if bytes(one.value for one in received) != sent:
+    if bytes(event.value for event in received) != sent:
         return f"its serial port takes other characters than were sent, as at another bit rate: {characters(received)}"
     return ""
 
 
 def why_lost(rule: Rule, network: int, image: Image, seed: int) -> str:
-    """Whether a robot's serial port did not take all characters of the rule's trial, or its program did no more."""
+    """True if a robot's serial port did not take all characters of the rule's trial, or its program did no more."""
     trial = trial_of(rule)
-    if rule.topologies[network].keyed or not all(isinstance(one, Transmission) for one in trial.script):
+    if rule.topologies[network].keyed or not all(isinstance(event, Transmission) for event in trial.script):
         return ""  # noise, or a robot that was off
     transmissions = trial.transmissions_of(network)
-    sent = len(b"".join(one.data for one in transmissions))
+    sent = len(b"".join(event.data for event in transmissions))
     for listener in listen(trial, image, seed):
         if listener.subject.network == network:
-            received = [one for one in listener.observed.events if one.what == "received"]
+            received = [event for event in listener.observed.events if event.what == "received"]
             if len(received) < sent:
                 return (
                     f"its serial port took {len(received)} of the trial's {sent} characters: off or too slow"
                 )
             if again := _begins_again(listener):
                 return again
-            last_tick = max((one.tick for one in listener.observed.commands), default=0)
-            later = [one for one in transmissions if one.tick > last_tick]
+            last_tick = max((event.tick for event in listener.observed.commands), default=0)
+            later = [event for event in transmissions if event.tick > last_tick]
             if last_tick and len(later) > _UNHEARD:
                 when = f"{last_tick / TICKS_PER_MS:.0f} ms"
                 return f"it does nothing after {when}, though {len(later)} frames follow: it hangs"
@@ -140,7 +142,7 @@ def _obeyed(observed: Observed, tried: Sequence[tuple[str, Frame]]) -> str:
 def _chips(listener: Listener) -> str:
     if not listener.subject.robot.board.left.reset_level:
         return "it holds its LM629s in reset (/RST is low)"
-    opcodes = {one.opcode for one in listener.observed.commands}
+    opcodes = {command.opcode for command in listener.observed.commands}
     if not opcodes:
         return "it tells its LM629s nothing at all"
     if opcodes.isdisjoint(BY_OPCODE):

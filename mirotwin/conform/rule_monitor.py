@@ -95,10 +95,12 @@ class RuleMonitor(ObservingMonitor[ConformsTo]):
             self.failures.clear()
             self.failed = 0
             return
-        judged = [one for one in self.trial.expected_of(self.subject) if one.tick < tick]
+        judged = [expected for expected in self.trial.expected_of(self.subject) if expected.tick < tick]
         self.judged += len(judged)
         failures = [
-            (one.wanted, *failure) for one in judged if (failure := one.found(self.observed)) is not None
+            (expected.wanted, *failure)
+            for expected in judged
+            if (failure := expected.found(self.observed)) is not None
         ]
         for wanted, failed_tick, text in sorted(failures, key=itemgetter(1)):
             self.fail(failed_tick, wanted, text)

@@ -86,7 +86,7 @@ def try_rule(rule: Rule, image: Image, seed: int = 0, keep: bool = False) -> Out
     """Runs the rule's trial on `image`; with `keep`, what failed is there as cases."""
     run = run_trial(trial_of(rule), ConformsTo(rule=rule.id), image, seed)
     world = run.world
-    failures = [one for one in run.failures if not one.fault]
+    failures = [failure for failure in run.failures if not failure.fault]
     faults = tuple(
         (robot.network, robot.slot, fault)
         for robot in world.robots
@@ -116,7 +116,7 @@ def _cases(
     if failures and run.world.finished:
         cases.append((own, run.stream({"conforms_to": rule.id}, str(failures[0]))))
     if faults:
-        first = min(faults, key=lambda one: one[2].tick)
+        first = min(faults, key=lambda fault: fault[2].tick)
         verdict = _of_fault("no_fault", NoFault.WANTED, *first)
         cases.append((of_fault, run.stream({"no_fault": True}, str(verdict))))
     return tuple(cases)
@@ -204,7 +204,7 @@ def in_order(
     causes: dict[str, str] = {}
     for rule in presupposed_first(rules):
         failed = () if everything else presupposed(rule)
-        cause = next((causes[one.id] for one in failed if one.id in causes), "")
+        cause = next((causes[cause_of.id] for cause_of in failed if cause_of.id in causes), "")
         outcome = Outcome(rule.id, (), cause=cause) if cause else tried(rule)
         if outcome.failures or outcome.cause:
             causes[rule.id] = outcome.cause or rule.id
@@ -218,9 +218,9 @@ def with_faults(outcomes: Sequence[Outcome], rules: Sequence[Rule]) -> list[Outc
     for rule in rules:
         if rule.id in by_id:  # else a port was lost before
             forbidden = [
-                _of_fault("conforms_to", f"no such fault (trial of {one.rule})", *fault)
-                for one in outcomes
-                for fault in one.faults
+                _of_fault("conforms_to", f"no such fault (trial of {outcome.rule})", *fault)
+                for outcome in outcomes
+                for fault in outcome.faults
                 if fault[2].kind in rule.faults
             ]
             outcome = by_id[rule.id]

@@ -45,7 +45,7 @@ class Sealing(msgspec.Struct, frozen=True, kw_only=True):
 
     def _whitened(self, data: bytes, place: int) -> bytes:
         string = self.string[place : place + len(data)]
-        return bytes(one ^ other for one, other in zip_longest(data, string, fillvalue=0))
+        return bytes(first ^ other for first, other in zip_longest(data, string, fillvalue=0))
 
     def _crc(self, data: bytes) -> int:
         return _crc_of(self.polynomial, self.start, self.end, self.reflected)(data)
@@ -79,8 +79,8 @@ _CRC: dict[str, dict[object, str]] = {
 def _checks() -> Iterator[tuple[str, Sealing]]:
     """Every mixture of them, those with one mistake first."""
     mixtures = [dict(zip(_CRC, values, strict=True)) for values in product(*_CRC.values())]
-    mistakes = [[_CRC[key][value] for key, value in one.items() if _CRC[key][value]] for one in mixtures]
-    for named, mixture in sorted(zip(mistakes, mixtures, strict=True), key=lambda one: len(one[0])):
+    mistakes = [[_CRC[key][value] for key, value in each.items() if _CRC[key][value]] for each in mixtures]
+    for named, mixture in sorted(zip(mistakes, mixtures, strict=True), key=lambda pair: len(pair[0])):
         if named:
             yield f"another CRC ({', '.join(named)})", msgspec.convert(mixture, Sealing)
 

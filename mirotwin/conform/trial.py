@@ -50,11 +50,11 @@ class Trial:
 
     def transmissions_of(self, network: int) -> list[Transmission]:
         """The transmissions of a network's host."""
-        return [one for one in self.script if isinstance(one, Transmission) and one.network == network]
+        return [item for item in self.script if isinstance(item, Transmission) and item.network == network]
 
     def expected_of(self, subject: Subject) -> list[TrialExpectation]:
         """The expectations of a robot."""
-        return [one for one in self.expected[subject.network] if subject.slot in one.slots]
+        return [expected for expected in self.expected[subject.network] if subject.slot in expected.slots]
 
 
 @lru_cache(maxsize=128)
@@ -64,7 +64,7 @@ def trial_of(rule: Rule) -> Trial:
     for script in scripts:
         rule.write(script)
     items: list[ScriptItem] = [item for script in scripts for item in (*script.sent, *script.done)]
-    end_tick = max(one.tick for script in scripts for one in script.expected)
+    end_tick = max(reaction.tick for script in scripts for reaction in script.expected)
     # everything before the end is reported, so the last expectation needs a tick more
     periods = end_tick // CONTROL_PERIOD_TICKS + 1
     places = iter(_PLACES)

@@ -163,39 +163,39 @@ class TrialScript:
         return tuple(pairs)
 
     def team(
-        self, words: Pairs | None = None, ask: bool = False, what: str = "", **how: Unpack[How]
+        self, words: Pairs | None = None, ask: bool = False, label: str = "", **how: Unpack[How]
     ) -> Frame:
         """A team frame."""
         pairs = self.words() if words is None else words
         kind = FrameType.TEAM_ASK if ask else FrameType.TEAM
-        return self.say(kind, payload_of(pairs), what or ("question" if ask else "team frame"), pairs, **how)
+        return self.say(kind, payload_of(pairs), label or ("question" if ask else "team frame"), pairs, **how)
 
     def same(self, left: int, right: int) -> Pairs:
         """New velocities, but for the robots that are there these."""
         there = self.topology.slots
         return tuple((left, right) if slot in there else pair for slot, pair in enumerate(self.words()))
 
-    def ask(self, what: str = "", words: Pairs | None = None, **how: Unpack[How]) -> Frame:
+    def ask(self, label: str = "", words: Pairs | None = None, **how: Unpack[How]) -> Frame:
         """A question to the robot in `slot`, with the next number that asks it."""
         slot = how.get("slot", self.slot)
         how["step"] = asking_step(self.seq, slot, self.n)
-        return self.team(words, ask=True, what=what or f"question to robot {slot}", **how)
+        return self.team(words, ask=True, label=label or f"question to robot {slot}", **how)
 
-    def service(self, opcode: int, data: bytes = b"", what: str = "", **how: Unpack[How]) -> Frame:
+    def service(self, opcode: int, data: bytes = b"", label: str = "", **how: Unpack[How]) -> Frame:
         payload = (bytes([how.get("slot", self.slot), opcode]) + data).ljust(self.form.payload_size, b"\0")
-        return self.say(FrameType.SERVICE, payload, what or f"service frame, opcode {opcode}", **how)
+        return self.say(FrameType.SERVICE, payload, label or f"service frame, opcode {opcode}", **how)
 
     def ping(self, **how: Unpack[How]) -> Frame:
         """A service frame that changes nothing."""
-        return self.service(Opcode.PING, what="ping", **how)
+        return self.service(Opcode.PING, label="ping", **how)
 
-    def filter(self, words: Words, what: str = "", **how: Unpack[How]) -> Frame:
+    def filter(self, words: Words, label: str = "", **how: Unpack[How]) -> Frame:
         """kp, ki, kd and il."""
         data = b"".join(word.to_bytes(2, "little") for word in words)
-        return self.service(Opcode.FILTER, data, what, **how)
+        return self.service(Opcode.FILTER, data, label, **how)
 
-    def acceleration(self, value: int, what: str = "", **how: Unpack[How]) -> Frame:
-        return self.service(Opcode.ACCELERATION, value.to_bytes(4, "little"), what, **how)
+    def acceleration(self, value: int, label: str = "", **how: Unpack[How]) -> Frame:
+        return self.service(Opcode.ACCELERATION, value.to_bytes(4, "little"), label, **how)
 
     def of_type_2(self, **how: Unpack[How]) -> Frame:
         """A frame that only robots send, with a good CRC."""
@@ -206,7 +206,7 @@ class TrialScript:
         how["slot"] = next(slot for slot in range(self.n) if slot not in self.topology.slots)
         return self.ask(**how)
 
-    def say(self, kind: int, payload: bytes, what: str, words: Pairs = (), **how: Unpack[How]) -> Frame:
+    def say(self, kind: int, payload: bytes, label: str, words: Pairs = (), **how: Unpack[How]) -> Frame:
         """A frame whose number is `step` past the last fresh one, which it becomes unless `fresh` is false.
 
         Instead of its preamble it may have another `lead`, and another `layout` byte in its CRC. `wrong` turns bits
@@ -225,7 +225,7 @@ class TrialScript:
         tick = self._put(lead + bytes(body), len(lead), how)
         end = self.now
         self.wait(how.get("gap_ms", GAP_MS))
-        text = f"{what}, seq {seq}"
+        text = f"{label}, seq {seq}"
         frame = Frame(tick, end - self.character_ticks, end, seq, words, text, self._before)
         self._before = words or self._before
         return frame
@@ -343,7 +343,9 @@ def _instead(observed: Observed, frame: Frame, orders: tuple[Order, Order]) -> s
         if late is not None:
             return f": obeyed {(late - frame.end_tick) / TICKS_PER_MS:.2f} ms after its end"
         wrote = observed.wrote(frame.tick, frame.acted_tick)
-        loaded = any(one.opcode == _LTRJ and one.data[1:2] and one.data[1] & _VELOCITY for one in wrote)
+        loaded = any(
+            command.opcode == _LTRJ and command.data[1:2] and command.data[1] & _VELOCITY for command in wrote
+        )
         return ": loaded, but not started (STT)" if loaded else ": no order came"
     mistake = wheels_instead(orders, frame, observed.slot)
     return f": {mistake}" if mistake else ""
@@ -370,7 +372,7 @@ def who(answer: ReceivedAnswer) -> str:
 def _no_answer(observed: Observed, question: Frame, deadline: int) -> str:
     received = within(observed.received, question.last_tick, deadline)
     later = within(observed.answers, deadline, observed.end_tick)
-    late = next((one for one in later if one.frame.seq == question.seq), None)
+    late = next((answer for answer in later if answer.frame.seq == question.seq), None)
     if late is not None and late.frame.start_tick < deadline + CONTROL_PERIOD_TICKS:
         return f"one that is over {(late.tick - question.end_tick) / TICKS_PER_MS:.2f} ms after the question's end"
     if not received:
@@ -385,7 +387,7 @@ def ms(time_ms: float) -> int:
 
 
 def obeys(order: Order, word: int) -> bool:
-    """Whether a wheel under `order` does what the radio's `word` says."""
+    """True if a wheel under `order` does what the radio's `word` says."""
     return (order.what == "drive" and order.word == word) or (word == 0 and order.what == "stop")
 
 

@@ -151,7 +151,9 @@ class Adapter:
             }
             for kind in FaultKind
         ]
-        return {f"supports{one}": True for one in CAPABILITIES} | {"exceptionBreakpointFilters": filters}
+        return {f"supports{capability}": True for capability in CAPABILITIES} | {
+            "exceptionBreakpointFilters": filters
+        }
 
     def on_launch(self, given: Message) -> None:
         if (
@@ -203,7 +205,7 @@ class Adapter:
         self.paused = self.ended = True
 
     def on_restart(self, given: Message) -> None:
-        """The same from its start, with the image as it is now; breakpoints are found again by their names."""
+        """Starts the subject again, with the image as it is now. Breakpoints are set again by their names."""
         asked, kinds = self.asked, self.its.fault_kinds
         self._open(given.get("arguments") or self.launched)
         self.its.fault_kinds = kinds
@@ -246,11 +248,11 @@ class Adapter:
     def on_setExceptionBreakpoints(self, given: Message) -> Message:
         names = [
             *(given.get("filters") or ()),
-            *(one["filterId"] for one in given.get("filterOptions") or ()),
+            *(option["filterId"] for option in given.get("filterOptions") or ()),
         ]
         known = [name in FaultKind.__members__ for name in names]
         self.its.fault_kinds = {FaultKind[name] for name in names if name in FaultKind.__members__}
-        return {"breakpoints": [{"verified": one} for one in known]}
+        return {"breakpoints": [{"verified": is_known} for is_known in known]}
 
     def on_exceptionInfo(self, given: Message) -> Message:
         """The fault, or the failed check of a case, at which it stands."""
@@ -264,7 +266,9 @@ class Adapter:
         """The lines with code from `line` to `endLine`."""
         name = AnyPath(given["source"].get("path") or given["source"].get("name") or "").name
         wanted = range(given["line"], (given.get("endLine") or given["line"]) + 1)
-        there = {one.line for one in self.symbols.line_begins.values() if AnyPath(one.file).name == name}
+        there = {
+            begin.line for begin in self.symbols.line_begins.values() if AnyPath(begin.file).name == name
+        }
         return {"breakpoints": [{"line": line} for line in sorted(there.intersection(wanted))]}
 
     def on_gotoTargets(self, given: Message) -> Message:
@@ -455,7 +459,9 @@ class Adapter:
         self.why = why
         word, _, digits = why.partition(" ")
         number = int(digits) if word == "breakpoint" else 0
-        kind = next((one.kind for one in self.its.breakpoints if one.number == number), "")
+        kind = next(
+            (breakpoint.kind for breakpoint in self.its.breakpoints if breakpoint.number == number), ""
+        )
         self.children.clear()
         self._event(
             "stopped",
@@ -663,7 +669,7 @@ def _logged(text: str) -> Callable[[Moment], str]:
     if len(text) > _MOST_LOG or len(names) > _MOST_TERMS:
         most = f"give {_MOST_LOG} characters and {_MOST_TERMS} expressions at most"
         raise BadInput("", "message", "is too long", most)
-    terms = {one: expression(one) for one in names}
+    terms = {name: expression(name) for name in names}
 
     def value(term: Term, moment: Moment) -> str:
         try:

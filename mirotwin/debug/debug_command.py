@@ -93,7 +93,7 @@ def _listen(port: int) -> int:
 
 
 def _is_own(client: socket.socket) -> bool:
-    """Whether the other end of a connection within this machine belongs to the user of this process."""
+    """True if the other end of a connection within this machine belongs to the user of this process."""
     try:
         ends = [_written(*end) for end in (client.getpeername(), client.getsockname())]
         rows = [line.split() for line in _TCP.read_text().splitlines()[1:]]

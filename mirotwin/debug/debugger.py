@@ -205,11 +205,11 @@ class Debugger:
         return place.space == "iram" and place.first <= last and place.end > first
 
     def _writes(self, written: Bytes, cpu: Cpu) -> bool:
-        """Whether the next instruction writes it, or the hardware's call of a routine has just done."""
+        """True if the next instruction writes it, or the hardware's call of a routine has just done."""
         return self._pushed(written, cpu) or written.are_written(cpu)
 
     def _pushed(self, written: Bytes, cpu: Cpu) -> bool:
-        """Whether the hardware has just called a routine, and the return address that it pushed lies there."""
+        """True if the hardware has just called a routine, and the return address that it pushed lies there."""
         entered = cpu.pc in self.symbols.unwinder.vectors and cpu.peripherals.interrupts.in_service
         if written.space == "sfr":
             return bool(entered) and written.first == SFRS["SP"]
@@ -225,11 +225,15 @@ class Debugger:
 
     def _traps(self, step: Trap | None = None) -> dict[int, Trap]:
         """What a search asks: the breakpoints, and `step` of the processor in focus."""
-        places = frozenset[int]().union(*(one.addresses for one in self.breakpoints))
+        places = frozenset[int]().union(*(breakpoint.addresses for breakpoint in self.breakpoints))
 
         def ask(core: Core) -> object:
             pc = core.cpu.pc
-            stops = [one for one in self.breakpoints if pc in one.addresses and self._stops(one, core)]
+            stops = [
+                breakpoint
+                for breakpoint in self.breakpoints
+                if pc in breakpoint.addresses and self._stops(breakpoint, core)
+            ]
             if stops:
                 return stops[0]
             if step is not None and core is self.timeline.core and pc in step.addresses:
@@ -379,7 +383,7 @@ class Debugger:
             for fault in (core.device.board.faults if self.fault_kinds else ())
             if fault.kind in self.fault_kinds
         ]
-        return min((one for one in since if one[0][0] > here[0]), default=None, key=lambda one: one[0])
+        return min((pair for pair in since if pair[0][0] > here[0]), default=None, key=lambda pair: pair[0])
 
     def _forward(self, step: Trap | None = None) -> str:
         self.told.clear()

@@ -126,7 +126,7 @@ def children(value: Value) -> list[tuple[str, Callable[[], Value]]]:
     if kind.kind == "array":
         return [(f"[{at}]", partial(_element, value, at)) for at in range(kind.count)]
     fields = value.fields.get(kind.tag, ()) if kind.kind == "struct" else ()
-    return [(one.name, partial(_part, value, one.type, one.offset)) for one in fields]
+    return [(field.name, partial(_part, value, field.type, field.offset)) for field in fields]
 
 
 def _part(value: Value, kind: CType, offset: int) -> Value:
@@ -171,7 +171,7 @@ def pointed(value: Value, index: Any, text: str) -> Value:
     space = MEMORY_OF_POINTER.get(kind.tag) or _GENERIC.get(address >> 16, "")
     element = kind.element
     if element is not None and element.kind == "struct":
-        size = max((one.offset + one.type.size for one in value.fields.get(element.tag, ())), default=0)
+        size = max((field.offset + field.type.size for field in value.fields.get(element.tag, ())), default=0)
         element = msgspec.structs.replace(element, size=size)
     if not space or element is None or not element.size:
         raise NoValue(
@@ -337,8 +337,8 @@ class _Reader:
             raise NoValue(f"{token} is no register", did_you_mean(name, known))
 
         def value(moment: Lookup) -> Value:
-            found = moment.find(name, "")
-            return Value(number=number(found), space="code" if name == "PC" else "")
+            held = moment.find(name, "")
+            return Value(number=number(held), space="code" if name == "PC" else "")
 
         return value
 

@@ -201,7 +201,7 @@ def _examined(session: Session, at: Examined) -> Iterator[str]:
         data = session.moment().read(value.space, value.address, units * at.size)
         words = [data[first : first + at.size] for first in range(0, len(data), at.size)]
         numbers = [int.from_bytes(word, "little") for word in words]
-        yield f"{at.space}[{at.address:#x}]:  {'  '.join(in_form(one, at.form, at.size) for one in numbers)}"
+        yield f"{at.space}[{at.address:#x}]:  {'  '.join(in_form(number, at.form, at.size) for number in numbers)}"
         at.address += len(data)
         left -= units
 
@@ -294,8 +294,8 @@ def info(session: Session, rest: str) -> None:
 
 def _registers(session: Session, rest: str) -> None:
     for name in [word.lstrip("$").upper() for word in rest.split()] or SHOWN_REGISTERS:
-        found = session.moment().find(name if name in (*SFRS, *SHOWN_REGISTERS) else name.lower(), "")
-        session.tell(f"{name:5} {shown(found)}")
+        held = session.moment().find(name if name in (*SFRS, *SHOWN_REGISTERS) else name.lower(), "")
+        session.tell(f"{name:5} {shown(held)}")
 
 
 def _locals(session: Session, rest: str) -> None:

@@ -84,11 +84,11 @@ def text_in(value: Value, always: bool = False) -> str | None:
 
 def text_at(value: Value, always: bool = True) -> str | None:
     """The text from a byte on, up to its NUL."""
-    found = bytearray()
+    data = bytearray()
     with suppress(BadInput):  # the memory ends there
-        while value.moment is not None and len(found) < _LONGEST_TEXT and found[-1:] != b"\0":
-            found += value.moment.read(value.space, value.address + len(found), 1)
-    return as_text(bytes(found), always)
+        while value.moment is not None and len(data) < _LONGEST_TEXT and data[-1:] != b"\0":
+            data += value.moment.read(value.space, value.address + len(data), 1)
+    return as_text(bytes(data), always)
 
 
 def as_text(data: bytes, always: bool) -> str | None:

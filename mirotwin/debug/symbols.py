@@ -67,7 +67,7 @@ class Symbols:
         known = [*self.unwinder.heights, *self.line_begins, *functions]
         self.instructions = instructions_of(image.code, image.used, known)
         names = [*image.symbols.names, *(name.removeprefix("_") for name in image.symbols.names)]
-        names += [*self.variables.by_name, *(one.name for one in self.blocks.variables)]
+        names += [*self.variables.by_name, *(variable.name for variable in self.blocks.variables)]
         self.meanings: dict[tuple[int, str, str], Meaning] = {}
         self.known = sorted({*names, *more, *SPECIAL, *SFRS, *BITS, *SIZES})
 
@@ -101,11 +101,15 @@ class Symbols:
             files = ", ".join(sorted({AnyPath(place.file).name for place in self.line_begins.values()}))
             remedy = f"the files are {files}" if files else "give an address: the image has no debug files"
             raise BadInput("", wanted, "no code is of this file", remedy)
-        place = min((place for place, _ in own if place.line >= line), default=None, key=lambda one: one.line)
+        place = min(
+            (place for place, _ in own if place.line >= line), default=None, key=lambda pair: pair.line
+        )
         if place is None:
             last = max(place.line for place, _ in own)
             raise BadInput("", wanted, "no line has code from there on", f"the last one is {last}")
-        addresses = sorted((address for one, address in own if one.line == place.line), reverse=True)
+        addresses = sorted(
+            (address for own_place, address in own if own_place.line == place.line), reverse=True
+        )
         firsts = {self.entry(address): address for address in addresses}
         return sorted(firsts.values()), place
 
@@ -190,8 +194,8 @@ class Moment:
         return lambda moment: Value(kind, space, address, moment, fields=fields)
 
     def _unknown(self, name: str) -> NoValue:
-        owners = {one.function for one in self.symbols.blocks.variables if one.name == name}
-        placed = {one.scope for one in self.symbols.variables.by_name.get(name, ())}
+        owners = {variable.function for variable in self.symbols.blocks.variables if variable.name == name}
+        placed = {variable.scope for variable in self.symbols.variables.by_name.get(name, ())}
         remedy = did_you_mean(name, self.symbols.known)
         if self._function in owners - placed:
             return NoValue(f"{name} is not live: no debug file says where this function keeps it")
@@ -225,14 +229,21 @@ class Moment:
         there = self.symbols.variables.by_name.get(name, ())
         if not module:
             there = tuple(
-                one for one in there if one.scope in ("", one.module) or one.scope == self._function
+                variable
+                for variable in there
+                if variable.scope in ("", variable.module) or variable.scope == self._function
             )
-        fitting = [one for one in there if not module or module in (one.scope, one.module)]
-        near = [one for one in fitting if one.scope == own] or [one for one in fitting if not one.scope]
+        fitting = [
+            variable for variable in there if not module or module in (variable.scope, variable.module)
+        ]
+        near = [variable for variable in fitting if variable.scope == own] or [
+            variable for variable in fitting if not variable.scope
+        ]
         if there and not near and len(fitting) != 1:
             reason = f"there are several {name}" if fitting else f"there is no {name} of {module}"
             raise NoValue(
-                reason, f"give one of {', '.join(f'{one.scope or one.module}:{name}' for one in there)}"
+                reason,
+                f"give one of {', '.join(f'{variable.scope or variable.module}:{name}' for variable in there)}",
             )
         return next(iter(near or fitting), None)
 
@@ -263,18 +274,18 @@ class Moment:
             return {}
         inner_last = reversed(places.visible(self.pc))
         in_memory = self.variables(places.name, places.module)
-        return in_memory | {one.name: partial(self._local, places, one) for one in inner_last}
+        return in_memory | {local.name: partial(self._local, places, local) for local in inner_last}
 
     def _local_meaning(self, name: str) -> Meaning | None:
         """How the value of a local variable is found; None for a name that is none here."""
         places = self._places()
         if places is None:
             return None
-        variable = next((one for one in places.visible(self.pc) if one.name == name), None)
+        variable = next((local for local in places.visible(self.pc) if local.name == name), None)
         if variable is not None:
             return lambda moment: moment._local(places, variable)
-        own = [one for one in self.symbols.variables.by_name.get(name, ()) if one.scope == places.name]
-        placed = max(own, key=lambda one: one.module == places.module, default=None)
+        own = [local for local in self.symbols.variables.by_name.get(name, ()) if local.scope == places.name]
+        placed = max(own, key=lambda local: local.module == places.module, default=None)
         return None if placed is None else lambda moment: moment.placed(placed)
 
     def _places(self) -> LocalPlaces | None:
@@ -287,9 +298,16 @@ class Moment:
 
         `module`: the file whose function is meant where several have one of this name.
         """
-        every = (one for _, each in sorted(self.symbols.variables.by_name.items()) for one in each)
-        own = sorted((one for one in every if one.scope == scope), key=lambda one: one.module == module)
-        return {one.name: partial(self.placed, one) for one in own if scope or one.space in _MEMORIES}
+        every = (variable for _, each in sorted(self.symbols.variables.by_name.items()) for variable in each)
+        own = sorted(
+            (variable for variable in every if variable.scope == scope),
+            key=lambda variable: variable.module == module,
+        )
+        return {
+            variable.name: partial(self.placed, variable)
+            for variable in own
+            if scope or variable.space in _MEMORIES
+        }
 
     def refuse(self, text: str, address: int) -> None:
         """Raises NoValue for an expression with a local variable that has no value wherever `address` is executed."""
@@ -300,7 +318,7 @@ class Moment:
                 local()
 
     def _is_lost(self, name: str) -> bool:
-        """Whether the code does not show where a local variable is."""
+        """True if the code does not show where a local variable is."""
         places = self._places()
         if places is None:
             return False

@@ -117,7 +117,7 @@ class Timeline:
 
     @property
     def at_begin(self) -> bool:
-        """Whether it stands where the run begins: at reset, or where a saved world goes on."""
+        """True if it stands where the run begins: at reset, or where a saved world goes on."""
         return self.core.cpu.cycles == self._begins[self.focus]
 
     @property
@@ -151,7 +151,7 @@ class Timeline:
         self.kept_bytes += len(state)
         if self.kept_bytes > BUDGET_BYTES:
             del self._checkpoints[1 : len(self._checkpoints) // 2 : 2]
-            self.kept_bytes = sum(len(one.state) for one in self._checkpoints)
+            self.kept_bytes = sum(len(checkpoint.state) for checkpoint in self._checkpoints)
 
     def _load(self, index: int) -> None:
         checkpoint = self._checkpoints[index]
@@ -185,8 +185,8 @@ class Timeline:
         put = Put(world.earliest_action_tick, device.network, device.slot, path, value)
         world.do(put)
         self._puts.append(put)
-        self._checkpoints = [one for one in self._checkpoints if one.tick < self._now]
-        self.kept_bytes = sum(len(one.state) for one in self._checkpoints)
+        self._checkpoints = [checkpoint for checkpoint in self._checkpoints if checkpoint.tick < self._now]
+        self.kept_bytes = sum(len(checkpoint.state) for checkpoint in self._checkpoints)
         self._save()
         return put.tick
 

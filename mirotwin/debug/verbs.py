@@ -66,7 +66,7 @@ def _quit(session: Session, rest: str) -> None:
 
 
 _PLACE = "PLACE is FILE:LINE, LINE, FUNCTION, ADDRESS or *ADDRESS."
-_FORMS = "FORM is one of gdb's letters: " + ", ".join(f"{one} {name}" for one, name in FORMS.items())
+_FORMS = "FORM is one of gdb's letters: " + ", ".join(f"{letter} {name}" for letter, name in FORMS.items())
 VERBS = (
     _move("continue", "c fg", "[N]", "to the next breakpoint, or the N-th time something stops"),
     _move("finish", "fin", "", "to the caller"),
@@ -127,7 +127,9 @@ _BEGUN_WORD = re.compile(r"[\w.]*$")
 
 def named(word: str) -> Verb:
     """The verb of a name, an alias, or the beginning of one. Raises BadInput."""
-    verb = _BY_NAME.get(word) or next((one for one in VERBS if one.name.startswith(word)), None)
+    verb = _BY_NAME.get(word) or next(
+        (candidate for candidate in VERBS if candidate.name.startswith(word)), None
+    )
     verb = verb or next((_BY_NAME[name] for name in _BY_NAME if name.startswith(word)), None)
     if verb is None:
         remedy = "nothing can be changed here: that would be another run" if word in _NOT_OF_A_RUN else ""
@@ -137,7 +139,7 @@ def named(word: str) -> Verb:
 
 
 def is_command(line: str, variables: Any) -> bool:
-    """Whether a line that may be an expression as well is a command: its verb is written in full, or an alias which is
+    """True if a line that may be an expression as well is a command: its verb is written in full, or an alias which is
     no name of the program.
     """
     begun = _COMMAND.match(line.strip())
@@ -188,9 +190,9 @@ def completions(session: Session, line: str) -> tuple[int, list[str]]:
         word = line.split(" ")[-1]
         there = {"verbs": [verb.name for verb in VERBS], "infos": [*looking.INFO]}.get(kind, [])
         return len(line) - len(word), sorted(name for name in there if name.startswith(word))
-    if kind == "conditions" and (found := _keys(line[begun.end() :])) is not None:
+    if kind == "conditions" and (words := _keys(line[begun.end() :])) is not None:
         word = re.split(r"[\s=]", line)[-1]
-        return len(line) - len(word), sorted(one for one in found if one.startswith(word))
+        return len(line) - len(word), sorted(candidate for candidate in words if candidate.startswith(word))
     return _names(session, line, kind)
 
 
@@ -203,14 +205,14 @@ def _names(session: Session, line: str, kind: Completes) -> tuple[int, list[str]
         there = sorted(
             name
             for name, variables in session.symbols.variables.by_name.items()
-            if any(static[1] in (one.module, one.scope) for one in variables)
+            if any(static[1] in (variable.module, variable.scope) for variable in variables)
         )
         return static.start(2), [name for name in there if name.startswith(static[2])]
     begun = _BEGUN_WORD.search(line)
     word = begun[0] if begun else ""
     names = set(session.symbols.known)
     if kind == "places":
-        names |= {f"{AnyPath(one.file).name}:" for one in session.symbols.line_begins.values()}
+        names |= {f"{AnyPath(variable.file).name}:" for variable in session.symbols.line_begins.values()}
     if kind == "conditions":
         names |= set(CONDITIONS)
     return len(line) - len(word), sorted(name for name in names if name.startswith(word))

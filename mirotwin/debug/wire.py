@@ -97,8 +97,8 @@ class Wire:
 
 def _given(value: Any) -> Any:
     if isinstance(value, dict):
-        return {key: _given(one) for key, one in value.items() if one is not None or key in _NULL}
-    return [_given(one) for one in value] if isinstance(value, list) else value
+        return {key: _given(inner) for key, inner in value.items() if inner is not None or key in _NULL}
+    return [_given(inner) for inner in value] if isinstance(value, list) else value
 
 
 def _garbage(data: bytes, fault: str) -> BadInput:

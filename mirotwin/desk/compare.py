@@ -75,10 +75,14 @@ def compare(
     beside, unsure = {}, 0
     for slot, answers in sorted(here.items()):
         beside[slot] = _side_by_side(answers, there.pop(slot, []), until_tick)
-        late = [one.tick - other.tick for one, other in beside[slot] if one is not None and other is not None]
+        late = [
+            twin.tick - other.tick for twin, other in beside[slot] if twin is not None and other is not None
+        ]
         unsure = max([unsure, *late])
         judged += _judged(beside[slot], late, slot, sent, rule)
-    differences = sorted((one for one in judged if one is not None), key=attrgetter("tick"))
+    differences = sorted(
+        (difference for difference in judged if difference is not None), key=attrgetter("tick")
+    )
     return PortComparison(
         beside, unsure / TICKS_PER_MS, differences, tuple(sorted(there)), judged.count(None)
     )
@@ -134,10 +138,10 @@ class _Sent:
             self.velocities.append(velocities)
 
     def near_a_limit(self, after_tick: int, until_tick: int, unsure_ticks: int) -> bool:
-        """Whether a silence in between is so long that a time limit of the robot may or may not be over."""
+        """True if a silence in between is so long that a time limit of the robot may or may not be over."""
         first = max(0, bisect_right(self.ends, after_tick) - 1)
         ends = self.ends[first : bisect_left(self.ends, until_tick)]
-        gaps = [other - one for one, other in pairwise(ends)]
+        gaps = [other - end for end, other in pairwise(ends)]
         return any(abs(gap - limit) < GAP_TICKS + unsure_ticks for gap in gaps for limit in LIMITS_TICKS)
 
     def rise(self, slot: int, wheel: int, after_tick: int, until_tick: int) -> float:
@@ -152,7 +156,7 @@ class _Sent:
                 words.append(0)
             before_tick = self.ends[index]
             words.append(self.velocities[index][slot][wheel])
-        return sum(abs(one - other) for one, other in pairwise([*words, 0])) / 2
+        return sum(abs(word - other) for word, other in pairwise([*words, 0])) / 2
 
 
 def _judged(
@@ -205,7 +209,7 @@ def _status(name: str) -> Callable[[TelemetryFrame, TelemetryFrame], int]:
 FIELDS: dict[str, tuple[Callable[[TelemetryFrame, TelemetryFrame], int], int | None]] = {
     "accepted": (_went("accepted", 1 << 8, 0), None),
     "rejected": (_went("rejected", 1 << 8, 0), None),
-    "flags": (lambda one, other: int(other.flags), None),
+    "flags": (lambda here, other: int(other.flags), None),
     "status left": (_status("status_left"), None),
     "status right": (_status("status_right"), None),
     "left moved": (_went("position_left", 1 << 16, -1 << 15), 0),

@@ -158,7 +158,7 @@ class Guard:
         )
 
     def _is_apart(self, frames: bytes, unsent: int) -> bool:
-        """Whether robots find nothing in these characters that moves them, behind any beginning of what was sent."""
+        """True if robots find nothing in these characters that moves them, behind any beginning of what was sent."""
         first = frames[: LONGEST - 1]
         ends = range(max(0, len(self._sent) - unsent), len(self._sent) + 1)
         across = (

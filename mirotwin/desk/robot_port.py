@@ -358,7 +358,7 @@ class RobotPort:
 
     def _why_nobody(self, sizes: Sequence[int], first: int) -> tuple[str, str]:
         """What came instead of answers, and what to do."""
-        came = b"".join(one.data for one in self.wire[first:] if one.direction == UP)
+        came = b"".join(sent.data for sent in self.wire[first:] if sent.direction == UP)
         problem = f"no robot of a network of {' or '.join(map(str, sizes))} answers"
         if not came:
             return f"{problem}: nothing comes", "is it switched on, and is this its radio's port?"

@@ -248,7 +248,7 @@ def terminal_of(world: World) -> Terminal:
 
 
 def has_terminal(world: World) -> bool:
-    """Whether the world is that of an image, with what the command line sends to it."""
+    """True if the world is that of an image, with what the command line sends to it."""
     line = world.lines[0]
     return isinstance(line, Wire) and line.terminal is not None
 

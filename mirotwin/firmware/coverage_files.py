@@ -37,7 +37,7 @@ class Report(msgspec.Struct, frozen=True):
 
 
 def has_listing(image: Image) -> bool:
-    """Whether the lines that are counted are those of a listing: no debug file names C lines."""
+    """True if the lines that are counted are those of a listing: no debug file names C lines."""
     return not DebugInfo.of(image).lines
 
 
@@ -58,7 +58,7 @@ def collect(image: Image, counts: Counts, sources: Sources, out: Path | None) ->
 
 
 def is_of_another_image(report: Report, out: Path) -> bool:
-    """Whether the listing beside `out` is not the one whose lines `report` counts: their numbers mean other things."""
+    """True if the listing beside `out` is not the one whose lines `report` counts: their numbers mean other things."""
     beside = listing_path(out)
     if report.listing is None or not beside.exists():
         return False

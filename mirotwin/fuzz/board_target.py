@@ -172,15 +172,15 @@ class BoardTarget(Target):
                 event = Event(tick=tick, what="received", slot=0, value=value, good_stop=bool(stop))
                 happened.append((tick, event))
             sent = (("transmitted", 0, bus.said), ("heard", PC, getattr(bus, "to_pc", ())))
-            for what, slot, characters in sent:
+            for kind, slot, characters in sent:
                 happened += [
-                    (tick, Event(tick=tick, what=what, slot=slot, value=value)) for value, tick in characters
+                    (tick, Event(tick=tick, what=kind, slot=slot, value=value)) for value, tick in characters
                 ]
-        for tick, one in sorted(happened, key=_BY_TICK):
-            if one is None:
+        for tick, caused in sorted(happened, key=_BY_TICK):
+            if caused is None:
                 monitor.restarted(tick)
-            elif one.what in monitor.EVENTS:
-                monitor.event(one)
+            elif caused.what in monitor.EVENTS:
+                monitor.event(caused)
 
     def _awake(self) -> int:
         """Firmware that waits for its transmitter is awake, and no worse for it: as long as it sends, it may go on."""
@@ -218,7 +218,7 @@ class BoardTarget(Target):
         return self.wired.put_at(tick, which, value)
 
     def describe(self, data: bytes) -> str:
-        return "\n".join(self._line(one) for one in self.script(data))
+        return "\n".join(self._line(item) for item in self.script(data))
 
     def _line(self, item: ScriptItem) -> str:
         protocol = self.protocol

@@ -114,7 +114,7 @@ class Campaign:
 
     @property
     def crashed(self) -> bool:
-        """Whether it has the crash that ends it."""
+        """True if it has the crash that ends it."""
         return self.until_crash and bool(self.triage.confirmed)
 
     @property

@@ -71,7 +71,7 @@ class CauseWatcher(Watcher):
         self._frames.append((cpu.sp, back))
 
     def _came_from_no_call(self, cpu: Cpu) -> bool:
-        """Whether a return went to what no way through the code leads to."""
+        """True if a return went to what no way through the code leads to."""
         return cpu.pc not in self._unwinder.heights and self._unwinder.call_before(cpu.pc) < 0
 
 

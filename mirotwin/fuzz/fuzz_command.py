@@ -461,7 +461,7 @@ class FuzzProgress(ProgressBar):
     def _columns(self) -> list[ProgressColumn]:
         from rich.progress import BarColumn, TextColumn, TimeRemainingColumn
 
-        words = [TextColumn(f"{{task.{one}}}", markup=False) for one in ("description", "fields[said]")]
+        words = [TextColumn(f"{{task.{key}}}", markup=False) for key in ("description", "fields[said]")]
         return [*words, BarColumn(bar_width=16), TimeRemainingColumn()]
 
 

@@ -47,7 +47,9 @@ Frame = tuple[int, bytes]
 def inputs_of(kind: str, happened: Iterable[ScriptItem], robots: int) -> list[bytes]:
     """The inputs of that kind that this becomes, at most so many transmissions each, no two the same."""
     items = [
-        one for one in happened if not isinstance(one, Transmission) or (one.direction == DOWN and one.data)
+        item
+        for item in happened
+        if not isinstance(item, Transmission) or (item.direction == DOWN and item.data)
     ]
     pieces = [items[first : first + TOGETHER] for first in range(0, len(items), TOGETHER)]
     return list(dict.fromkeys(filter(None, (input_of(kind, piece, robots) for piece in pieces))))
@@ -175,8 +177,8 @@ def seeds(kind: str, robots: int, slot: int) -> list[bytes]:
     """The built-in inputs of that kind."""
     inputs = [input_of(kind, sent(talk, robots), robots) for talk in talks(robots, slot)]
     if kind == "session":
-        inputs += [one + bytes([SILENCE, 39]) for one in inputs[:1]]  # 120 ms of silence at the end
-        inputs += [one + bytes([SILENCE, 173]) for one in inputs[:1]]  # 522 ms
+        inputs += [seed + bytes([SILENCE, 39]) for seed in inputs[:1]]  # 120 ms of silence at the end
+        inputs += [seed + bytes([SILENCE, 173]) for seed in inputs[:1]]  # 522 ms
     return list(dict.fromkeys(inputs))
 
 

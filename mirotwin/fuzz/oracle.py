@@ -106,7 +106,7 @@ def expected_of(check: str) -> dict[str, Any]:
 
 
 def _end_tick(script: Sequence[ScriptItem]) -> int:
-    return max((one.end_tick if isinstance(one, Transmission) else one.tick for one in script), default=0)
+    return max((item.end_tick if isinstance(item, Transmission) else item.tick for item in script), default=0)
 
 
 def _questions(script: Sequence[ScriptItem], found_tick: int, robots: int, slot: int) -> list[Transmission]:

@@ -148,9 +148,9 @@ class CampaignResults:
         """The checks of --expect that judged no input."""
         verdicts = self.campaign.verdicts
         return {
-            name: "not observable" if "not observable" in found else "not judged"
-            for name, found in verdicts.items()
-            if not found & {"passed", "failed"}
+            name: "not observable" if "not observable" in results else "not judged"
+            for name, results in verdicts.items()
+            if not results & {"passed", "failed"}
         }
 
     def _crash(self, crash: Crash) -> Iterator[str]:

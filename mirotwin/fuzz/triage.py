@@ -228,7 +228,7 @@ class Triage:
 
 
 Question = Callable[[bytes], bool]
-"""Whether an input still does it."""
+"""True if an input still does it."""
 
 
 def minimise(

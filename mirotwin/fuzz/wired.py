@@ -163,7 +163,7 @@ class WiredMachine:
         values = [self.choices[which][1](bits) for bits in range(0x10000)]
         if value in values:
             return values.index(value)
-        numbers = [bits for bits, one in enumerate(values) if not isinstance(one, str)]
+        numbers = [bits for bits, each in enumerate(values) if not isinstance(each, str)]
         if isinstance(value, str) or not numbers:
             return 0
         return min(numbers, key=lambda bits: abs(float(values[bits]) - value))

@@ -106,7 +106,7 @@ class Endpoint:
                 self._is_said(self.port.remark_on_sending(baud))
 
     def _is_said(self, remark: str) -> bool:
-        """Whether there is a remark, which is told once a client."""
+        """True if there is a remark, which is told once a client."""
         if remark and remark not in self._remarks:
             self._remarks.add(remark)
             self.tell(f"{self.name}: {self.client or 'the client'} {remark}")

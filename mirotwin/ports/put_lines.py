@@ -87,7 +87,7 @@ class PutLines:
         return lines
 
     def _is_ours(self) -> bool:
-        """Whether there is something to read, and at a terminal this process may: one in the background would stop."""
+        """True if there is something to read, and at a terminal this process may: one in the background would stop."""
         import select
 
         if not select.select([self._descriptor], [], [], 0)[0]:

@@ -49,7 +49,7 @@ class RadioPort:
         return max(0, TRANSMIT_CHARACTERS - self.waiting)
 
     def takes(self, baud: int) -> bool:
-        """Whether a client can set this rate."""
+        """True if a client can set this rate."""
         return baud == self.baud
 
     def remark_on_sending(self, baud: int) -> str:
@@ -79,7 +79,7 @@ class RadioPort:
     def purge(self) -> None:
         """Takes back what has not begun to be sent."""
         outbox = self._line.outbox
-        outbox.waiting = [one for one in outbox.waiting if one.origin != INJECTED]
+        outbox.waiting = [sent for sent in outbox.waiting if sent.origin != INJECTED]
 
     def received(self) -> bytes:
         """What the PC has received since the last call; to be called before 4096 events at the PC have passed."""

@@ -93,5 +93,5 @@ class WirePort(RadioPort):
         return (self.world.clock + bit_ticks // 2) // bit_ticks if bit_ticks else 0
 
 
-def _differ(one: int, other: int) -> bool:
-    return abs(one - other) > TOLERANCE * other
+def _differ(first: int, other: int) -> bool:
+    return abs(first - other) > TOLERANCE * other

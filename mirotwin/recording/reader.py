@@ -114,7 +114,7 @@ class _Collector:
         if message.index != self.first + len(self.periods):
             raise ValueError(f"period {message.index} where {self.first + len(self.periods)} should be")
         robots = tuple(
-            channels.robot_period(network, slot, found) for (network, slot), found in self.robots.items()
+            channels.robot_period(network, slot, robot) for (network, slot), robot in self.robots.items()
         )
         taken = tuple(self.wire), message.digest, tuple(self.actions), tuple(self.values)
         period = Period(message.index, message.tick, robots, *taken)

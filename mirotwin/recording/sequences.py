@@ -40,7 +40,9 @@ def commands(periods: Sequence[Period], index: int, side: str, answers: bool) ->
 
 def transmissions(periods: Sequence[Period], network: int, sent: bool) -> list[LogEntry]:
     """The transmissions `on_air`."""
-    return [LogEntry(one.tick, _text(one)) for one in on_air(periods, network, sent)]
+    return [
+        LogEntry(transmission.tick, _text(transmission)) for transmission in on_air(periods, network, sent)
+    ]
 
 
 def characters(periods: Sequence[Period], network: int) -> list[LogEntry]:
@@ -134,7 +136,7 @@ def pairs(
 
 
 def _follows(entries: Sequence[LogEntry], index: int, wanted: LogEntry, within_ticks: int) -> bool:
-    """Whether an entry behind `index` has the text of `wanted`, at its time."""
+    """True if an entry behind `index` has the text of `wanted`, at its time."""
     for place in range(index + 1, len(entries)):
         if entries[place].tick > wanted.tick + within_ticks:
             return False

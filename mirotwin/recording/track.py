@@ -88,7 +88,7 @@ def last_second(samples: Sequence[ErrorSample]) -> Sequence[ErrorSample]:
 
 
 def settled(samples: Sequence[ErrorSample]) -> bool:
-    """Whether a robot has settled: it was within 3 cm and 0.15 rad for the whole last second of the run."""
+    """True if a robot has settled: it was within 3 cm and 0.15 rad for the whole last second of the run."""
     return all(sample.within_limits for sample in last_second(samples))
 
 

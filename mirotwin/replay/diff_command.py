@@ -84,7 +84,7 @@ class DiffOptions(Options, frozen=True, kw_only=True):
 
     @property
     def shows(self) -> bool:
-        """Whether tables are printed."""
+        """True if tables are printed."""
         return not self.quiet and not self.compare.as_json
 
 
@@ -133,7 +133,7 @@ def diff(options: DiffOptions) -> int:
 
 
 def _are_images(options: DiffOptions) -> bool:
-    """Whether A and B are, not recordings. Raises BadInput where one is, and for options that are for images."""
+    """True if A and B are, not recordings. Raises BadInput where one is, and for options that are for images."""
     paths = file_in(options.a), file_in(options.b)
     images = [path for path in paths if _is_image(path)]
     if len(images) == 1:

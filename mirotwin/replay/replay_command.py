@@ -77,12 +77,12 @@ class ReplayOptions(CaseOptions, frozen=True, kw_only=True):
 
     @property
     def expects(self) -> bool:
-        """Whether checks decide, not differences."""
+        """True if checks decide, not differences."""
         return bool(self.expected) or any(".expect." in f".{key}" for key in self.settings)
 
     @property
     def shows(self) -> bool:
-        """Whether tables are printed."""
+        """True if tables are printed."""
         return not self.quiet and not self.compare.as_json
 
 

@@ -149,8 +149,8 @@ class Fates:
     ) -> None:
         self._kinds: dict[tuple[int, int], dict[int, str]] = {}
         self._ticks: dict[int, list[int]] = {}
-        for one in sent:
-            self._ticks.setdefault(one.network, []).append(one.tick)
+        for transmission in sent:
+            self._ticks.setdefault(transmission.network, []).append(transmission.tick)
         for mark in marks:
             if mark.robot is not None and mark.kind in FATES:
                 network, slot = mark.robot
@@ -200,7 +200,9 @@ def frame_tables(
     networks = job.spec.robot_scenario.networks
     sent = transmissions_of(job.recorded or replayed)
     delays = [ticks(network.radio.latency_s) for network in networks]
-    fates = Fates([one for one in sent if one.direction == DOWN], marks, delays, to_tick)
+    fates = Fates(
+        [transmission for transmission in sent if transmission.direction == DOWN], marks, delays, to_tick
+    )
     several = len(networks) > 1
     frames = []
     for row in rows(sent, lambda network: networks[network].robots):
@@ -255,7 +257,7 @@ def response_table(replayed: Sequence[Period]) -> Table:
     table = plain_table(*names, justify="right")
     for index, robot in enumerate(replayed[-1].robots):
         records = [period.robots[index] for period in replayed]
-        commands = sum(len(one.left.commands) + len(one.right.commands) for one in records)
+        commands = sum(len(record.left.commands) + len(record.right.commands) for record in records)
         counters = [
             str(count) if count is not None else "?"
             for count in (robot.accepted, robot.rejected, robot.stale)

@@ -30,7 +30,7 @@ HEAD_BYTES = 1 << 20
 
 
 def is_of_board(head: bytes, format: str) -> bool:
-    """Whether a recording or a stream file that begins so is of a board."""
+    """True if a recording or a stream file that begins so is of a board."""
     messages = Messages(BytesIO(head).read, "", ())
     reader = stream.Reader(head.decode("utf-8", "replace").split("\n"))
     with suppress(RecordingError, StreamError):

@@ -260,7 +260,9 @@ def _rows(options: ExportOptions, given: Input, form: Form, job: Job | None) -> 
         yield from recorded_rows(given, options.network)
     elif job is None:
         sent = timed_capture(given, complain, options.capture, form).sent
-        yield from (wire_row(one) for one in sent if options.network in (None, one.network))
+        yield from (
+            wire_row(transmission) for transmission in sent if options.network in (None, transmission.network)
+        )
     if job is not None:
         with ProgressBar("running it again", job.end_tick, options.quiet) as bar:
             yield from board_rows(job, bar.to)

@@ -33,7 +33,7 @@ def draw(tracks: Tracks, path: Path, *, scenario: str, seed: int, title: str = "
     height = TOP + 2 * (PANEL + GAP) + rows * (INNER + 36) + BOTTOM
     errors = next(iter(tracks.robots.values())).errors
     drawing = Drawing(WIDTH, height, _heading(scenario, seed, title, errors))
-    panels = [path_panel(tracks), *(error_panel(tracks, *one) for one in ERRORS)]
+    panels = [path_panel(tracks), *(error_panel(tracks, *kind) for kind in ERRORS)]
     for index, panel in enumerate(panels):
         drawing.add(panel, _box(2, index % 2, TOP + index // 2 * (PANEL + GAP), PANEL))
     for index, name in enumerate(inner):

@@ -105,7 +105,7 @@ def report(options: ReportOptions) -> int:
 
 
 def is_campaign(subject: str) -> bool:
-    """Whether it is a Parquet file, by its first bytes."""
+    """True if it is a Parquet file, by its first bytes."""
     if not Path(subject).is_file():
         return False
     with open(subject, "rb") as file:
@@ -133,9 +133,9 @@ def _side(wanted: ReportOptions, subject: str) -> Side:
     job = load_job(_file_of(subject), capture=wanted.capture)
     file = Path(job.spec.origin)
     if job.alone or job.origin:
-        what = "a board" if job.alone else "what was recorded at a port"
+        origin = "a board" if job.alone else "what was recorded at a port"
         raise BadInput(
-            f"{file}", "", f"is of {what}: two runs of robots have one page", "give one file for its page"
+            f"{file}", "", f"is of {origin}: two runs of robots have one page", "give one file for its page"
         )
     complain(*job.notes)
     shown = wanted.shown(job)
@@ -208,7 +208,7 @@ def _of_recording(wanted: ReportOptions, job: Job) -> Material:
         notes=notes,
         extras=extras,
         replayed=replayed_run,
-        differences=[replace(one, clock=scenario.clock) for one in changes],
+        differences=[replace(change, clock=scenario.clock) for change in changes],
         steps=None if summary is None else summary.steps,
     )
 

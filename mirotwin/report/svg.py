@@ -191,7 +191,7 @@ class _Axes:
     def _path(self, mark: Stroke, dots: bool) -> str:
         step = -(-len(mark.x) // MOST_POINTS)
         points = zip(mark.x[::step], mark.y[::step], strict=True)
-        known = (one for one in points if math.isfinite(one[0]) and math.isfinite(one[1]))
+        known = (point for point in points if math.isfinite(point[0]) and math.isfinite(point[1]))
         pixels = [at for at, _ in groupby(f"{self.x(x):.1f} {self.y(y):.1f}" for x, y in known)]
         if dots:
             return "".join(f"M{at}h0" for at in pixels)
@@ -221,7 +221,7 @@ def ticks(low: float, high: float, most: float) -> list[tuple[float, str]]:
     rough = (high - low) / max(3.0, most)
     decimals = -math.floor(math.log10(rough))
     unit = 10.0**-decimals
-    factor = next(one for one in (1, 2, 5, 10) if one * unit >= rough * 0.999)
+    factor = next(factor_of for factor_of in (1, 2, 5, 10) if factor_of * unit >= rough * 0.999)
     step, digits = factor * unit, max(0, decimals - (factor == 10))
     first, last = math.ceil(low / step - 1e-9), math.floor(high / step + 1e-9)
     return [(number * step, f"{number * step:.{digits}f}") for number in range(first, last + 1)]
@@ -243,7 +243,7 @@ def _text(x: float, y: float, text: str, style: str, more: str = "", sub: bool =
     if sub:
         first, *rest = shown.split("_")
         lower = (
-            f'<tspan class="sub" dy="3">{one[:1]}</tspan><tspan dy="-3">{one[1:]}</tspan>' for one in rest
+            f'<tspan class="sub" dy="3">{part[:1]}</tspan><tspan dy="-3">{part[1:]}</tspan>' for part in rest
         )
         shown = first + "".join(lower)
     return f'<text x="{x:.1f}" y="{y:.1f}" class="{style}"{more}>{shown}</text>'

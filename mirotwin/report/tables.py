@@ -98,8 +98,13 @@ def _fill(row: Row, commands: list[Row], prefix: str, message: Any) -> None:
             _fill(row, commands, f"{prefix}{name}_", value)
         elif name == COMMANDS:
             commands += [
-                {"tick": one.tick, "chip": prefix[:-1], "opcode": one.opcode, "data_hex": one.data}
-                for one in value
+                {
+                    "tick": command.tick,
+                    "chip": prefix[:-1],
+                    "opcode": command.opcode,
+                    "data_hex": command.data,
+                }
+                for command in value
             ]
         elif isinstance(value, dict):
             row |= {f"{prefix}{name}.{key}": inner for key, inner in value.items()}

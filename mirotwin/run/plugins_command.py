@@ -87,15 +87,17 @@ def plugins(options: PluginsOptions) -> None:
     chosen = list(dict.fromkeys(options.kinds or BY_KIND))
     listed = {kind: list(plugins_of(kind)) for kind in chosen}
     if options.as_json:
-        print_json({"plugins": [one for kind in chosen for one in listed[kind]]})
+        print_json({"plugins": [plugin for kind in chosen for plugin in listed[kind]]})
     elif options.kinds:
-        print_result(*(line for kind in chosen for one in listed[kind] for line in _page(one)))
+        print_result(*(line for kind in chosen for plugin in listed[kind] for line in _page(plugin)))
     else:
         for kind in chosen:
             table = plain_table(kind, "what it is", bold=True)
-            for one in listed[kind]:
-                foreign = f" ({one.distribution} {one.version})" if one.distribution != "mirotwin" else ""
-                table.add_row(one.name, (one.problem or one.about) + foreign)
+            for plugin in listed[kind]:
+                foreign = (
+                    f" ({plugin.distribution} {plugin.version})" if plugin.distribution != "mirotwin" else ""
+                )
+                table.add_row(plugin.name, (plugin.problem or plugin.about) + foreign)
             print_result(table, "")
         print_result("keys of each, and where it comes from: mirotwin plugins KIND, such as laws")
 
@@ -160,7 +162,9 @@ def head_of(struct: type) -> str:
 def about(struct: type) -> str:
     """What it is, in one sentence: the head of its file says that, or its class where the file holds several."""
     module = sys.modules.get(struct.__module__)
-    tagged = [one for one in vars(module).values() if _tagged(one, struct)] if module is not None else []
+    tagged = (
+        [member for member in vars(module).values() if _tagged(member, struct)] if module is not None else []
+    )
     own = inspect.cleandoc(struct.__doc__ or "")
     text = (own if len(tagged) > 1 else "") or head_of(struct) or own
     sentence = _SENTENCE.split(" ".join(text.partition("\n\n")[0].split()))[0]
@@ -168,7 +172,7 @@ def about(struct: type) -> str:
 
 
 def _tagged(value: Any, struct: type) -> bool:
-    """Whether it is a plug-in that stands in the same file."""
+    """True if it is a plug-in that stands in the same file."""
     config = getattr(value, "__struct_config__", None)
     return isinstance(value, type) and value.__module__ == struct.__module__ and bool(config and config.tag)
 
@@ -194,11 +198,11 @@ def takes(kind: kinds.Type, key: str = "") -> str:
     if isinstance(kind, kinds.LiteralType):
         return " or ".join(msgspec.json.encode(value).decode() for value in kind.values)
     if isinstance(kind, kinds.UnionType):
-        return " or ".join(dict.fromkeys(takes(one, key) for one in kind.types))
+        return " or ".join(dict.fromkeys(takes(option, key) for option in kind.types))
     if isinstance(kind, kinds.IntType | kinds.FloatType):
-        what = "a whole number" if isinstance(kind, kinds.IntType) else "a number"
+        word = "a whole number" if isinstance(kind, kinds.IntType) else "a number"
         unit = unit_name(key)
-        return f"{what}{' in ' * bool(unit)}{unit}{_range(kind)}"
+        return f"{word}{' in ' * bool(unit)}{unit}{_range(kind)}"
     words = {kinds.BoolType: "true or false", kinds.StrType: "a string", kinds.NoneType: "nothing"}
     return words.get(type(kind), "a list" if "Tuple" in type(kind).__name__ else "a table")
 

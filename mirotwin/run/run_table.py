@@ -68,7 +68,7 @@ def begun_table(summary: AnySummary, covered: str, *more: tuple[str, str]) -> Ta
 
 
 def ended_table(table: Table, summary: AnySummary, folder: Path, image: str = "") -> Table:
-    """The same with the last rows."""
+    """Adds the last rows: firmware, faults, files."""
     firmware = summary.firmware
     idle = 100.0 * firmware.idle_cycles / firmware.machine_cycles if firmware.machine_cycles else 0.0
     table.add_row(

@@ -20,7 +20,7 @@ class ScenariosGroup(LazyGroup):
     """Tells what was meant where a scenario is named instead of a command."""
 
     def shows(self, name: str) -> bool:
-        """Whether `show` takes this name."""
+        """True if `show` takes this name."""
         return name in scenario_file.builtin_names() or name.endswith(".toml")
 
     def resolve_command(

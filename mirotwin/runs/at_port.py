@@ -102,7 +102,7 @@ def send(
         later = CONTROL_PERIOD_TICKS - sent[0].tick
         when = f"{seconds(port.began_tick + later):.3f} s later than in the file"
         note(f"all times are {when}, which begins after the greeting")
-        due = [msgspec.structs.replace(one, tick=one.tick + later) for one in sent]
+        due = [msgspec.structs.replace(transmission, tick=transmission.tick + later) for transmission in sent]
         port.play(due, lambda tick: progress(tick - due[0].tick))
     late = [ticks / TICKS_PER_MS for ticks in sorted(port.late_ticks)]
     of_99, hint = late[len(late) * 99 // 100], ""

@@ -68,7 +68,7 @@ def board_of_stream(given: StreamFile) -> BoardScenario:
 
 def end_of_board(script: Sequence[ScriptItem], scenario: BoardScenario) -> int:
     """Where a stream ends that does not say it."""
-    ends = [one.tick + _duration(one, scenario) for one in script]
+    ends = [item.tick + _duration(item, scenario) for item in script]
     return max(ends, default=scenario.begin_tick) + after_ticks(scenario)
 
 
@@ -77,7 +77,7 @@ def after_ticks(scenario: BoardScenario) -> int:
 
 
 def is_for_board(header: Header) -> bool:
-    """Whether a stream is for a board, and not for robots."""
+    """True if a stream is for a board, and not for robots."""
     return not (header.bare is None and header.board is None) or (
         isinstance(header.scenario, dict) and BOARD in header.scenario
     )
@@ -152,7 +152,7 @@ def board_spec(
     origin: str = "",
 ) -> RunSpec:
     """The board of `scenario` from power-on to `until_tick`. `expect`: checks by name, as in `[expect]`."""
-    begins = [max(0, one.tick - AHEAD_TICKS) for one in script]
+    begins = [max(0, item.tick - AHEAD_TICKS) for item in script]
     scenario = msgspec.structs.replace(
         scenario,
         begin_tick=min([scenario.begin_tick, *begins]),

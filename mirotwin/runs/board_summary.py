@@ -91,7 +91,7 @@ def summarise_board(world: World, serial: SerialCounts, wall_s: float, begin_tic
     values = (
         {}
         if world.last is None
-        else {key: value for one in world.last.values for key, value in one.values.items()}
+        else {key: value for device in world.last.values for key, value in device.values.items()}
     )
     return BoardSummary(
         scenario=scenario.name,

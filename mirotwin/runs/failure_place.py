@@ -42,7 +42,7 @@ def place_at(spec: RunSpec, tick: int, place: tuple[int, int] | None = None) -> 
 
 def _place_at(spec: RunSpec, tick: int, place: tuple[int, int] | None) -> Place | None:
     world = spec.world()
-    devices = {(one.network, one.slot): one for one in reversed([*world.devices])}
+    devices = {(robot.network, robot.slot): robot for robot in reversed([*world.devices])}
     device = devices[place] if place in devices else world.devices[0]
     cpu = device.board.cpu
     while world.tick < tick and not world.finished:

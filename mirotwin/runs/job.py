@@ -77,12 +77,12 @@ def script_of(periods: Iterable[Period]) -> list[ScriptItem]:
 
 def script_of_stream(lines: Iterable[ScriptItem]) -> list[ScriptItem]:
     """Everything that is sent or done to robots."""
-    return [one for one in lines if not isinstance(one, Transmission) or one.direction == DOWN]
+    return [item for item in lines if not isinstance(item, Transmission) or item.direction == DOWN]
 
 
 def sent_in(script: Iterable[ScriptItem]) -> list[Transmission]:
     """Only what hosts send."""
-    return [one for one in script if isinstance(one, Transmission) and one.direction == DOWN]
+    return [item for item in script if isinstance(item, Transmission) and item.direction == DOWN]
 
 
 def check_script(script: Sequence[ScriptItem], scenario: Scenario | None = None) -> None:
@@ -158,15 +158,15 @@ def _default_scenario(script: Sequence[ScriptItem]) -> Scenario:
 
     Runs for a second longer than the stream, so that the failsafe shows.
     """
-    ends = [one.end_tick if isinstance(one, Transmission) else one.tick for one in script]
+    ends = [item.end_tick if isinstance(item, Transmission) else item.tick for item in script]
     end_tick = max(ends) + AFTERMATH_TICKS
     if end_tick > LONGEST_TICKS:
-        last = max(one.tick for one in script)
+        last = max(item.tick for item in script)
         remedy = (
             "cut the capture, or let the stream start near tick 0 (`mirotwin export` makes one of a capture)"
         )
         raise BadInput("", f"tick {last}", "more than a day", remedy)
-    count = 1 + max(one.network for one in script)
+    count = 1 + max(item.network for item in script)
     settings = ["camera={kind = 'gaussian'}", "expect={}"]  # nothing steers by it or is expected
     base = load(DEFAULT_SCENARIO, settings).scenario
     model = base.networks[0].robot[0]
@@ -175,7 +175,7 @@ def _default_scenario(script: Sequence[ScriptItem]) -> Scenario:
     model = replace(model, wheel_radius_mismatch=0.0, reference=standing)
     networks = []
     for index in range(count):
-        robots = robots_of_stream(one for one in script if one.network == index)
+        robots = robots_of_stream(item for item in script if item.network == index)
         network = NetworkSpec(
             robots=5 if robots == 5 else 3,
             host="silent",
@@ -241,7 +241,7 @@ class Job(msgspec.Struct, frozen=True, kw_only=True):
 
     @property
     def alone(self) -> bool:
-        """Whether it is of a board alone."""
+        """True if it is of a board alone."""
         return isinstance(self.spec.scenario, BoardScenario)
 
     def check_case(self) -> None:
@@ -256,7 +256,7 @@ class Job(msgspec.Struct, frozen=True, kw_only=True):
     def result_of_case(self, run: Run) -> Result:
         """What the checks that it names say this time, or all where it has no verdict."""
         checks, result = run.checks, run.result()
-        named = [one.verdict for one in checks.verdicts() if one.name in checks.named]
+        named = [each.verdict for each in checks.verdicts() if each.name in checks.named]
         verdict = judge(named) if self.case.verdict else checks.verdict()
         why = [line for verdict, line in expectation_lines(checks) if verdict != "failed"]
         outcome = result_of_case(self.case.verdict, checks.failures, self.case.changed, verdict, why)
@@ -404,7 +404,7 @@ def _stream(data: bytes, path: str, capture: CaptureOptions) -> tuple[stream.Str
     if form.name == "stream":
         return stream.decode(data, path), notes, ""
     source = timed_capture(given, notes.append, capture, form)
-    sent = sorted(source.sent, key=lambda one: one.tick)
+    sent = sorted(source.sent, key=lambda transmission: transmission.tick)
     return stream.StreamFile(tuple(map(stream.Entry, sent)), source=path), notes, form.title
 
 

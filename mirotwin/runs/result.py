@@ -63,7 +63,7 @@ class Result(msgspec.Struct, frozen=True, kw_only=True):
     @property
     def failed_tick(self) -> int:
         """Where it failed first; -1 if nothing did that has a time."""
-        ticks = [self.step_tick] * (self.step_tick >= 0) + [one.tick for one in self.failures]
+        ticks = [self.step_tick] * (self.step_tick >= 0) + [failure.tick for failure in self.failures]
         return ticks[0] if ticks else -1
 
     def facts(self) -> dict[str, str | int | float]:
@@ -116,7 +116,9 @@ def expectation_lines(checks: Checks) -> Iterator[Line]:
     for verdict in checks.verdicts():
         if verdict.reason and verdict.name in checks.named:
             yield verdict.verdict, f"expectation {verdict.verdict}: {verdict.name}: {verdict.reason}"
-        failures = [one for one in checks.failures if one.check == verdict.name and not one.fault]
+        failures = [
+            failure for failure in checks.failures if failure.check == verdict.name and not failure.fault
+        ]
         for failure in failures[:LINES]:
             yield "failed", f"expectation failed: {failure}"
         if failures and verdict.failures > LINES:
@@ -139,8 +141,8 @@ def expectations_text(expectations: Sequence[Expectation]) -> str:
     """How many checks passed, and the names of those that did not, for people. One that is always on and had no
     occasion is not counted.
     """
-    counted = [one for one in expectations if one.verdict != "not judged" or one.name not in ALWAYS_ON]
-    others = [f"{one.name} {one.verdict}" for one in counted if one.verdict != "passed"]
+    counted = [each for each in expectations if each.verdict != "not judged" or each.name not in ALWAYS_ON]
+    others = [f"{each.name} {each.verdict}" for each in counted if each.verdict != "passed"]
     return ", ".join([f"{len(counted) - len(others)} of {amount(len(counted), 'check')} passed", *others])
 
 
@@ -158,14 +160,14 @@ def result_of_case(
     """
     name = recorded.partition(":")[0]
     if failures:
-        same = [one for one in failures if str(one) == recorded]
+        same = [failure for failure in failures if str(failure) == recorded]
         first = (same or failures)[0]
         lines = [f"fails as recorded: {first}" if same else f"still fails, but not as recorded: {first}"]
         if not recorded:
             lines = [f"fails: {first}"]
         elif not same:
             lines.append(f"recorded: {recorded}")
-        fault = next((one for one in failures if one.fault), None)
+        fault = next((failure for failure in failures if failure.fault), None)
         if fault not in (None, first):
             lines.append(f"and a firmware fault: {fault}")
         reported = [first] if fault in (None, first) else [first, fault]

@@ -181,7 +181,7 @@ class Run:
 
     def verdict_on(self, name: str) -> Verdict:
         """The verdict of one check."""
-        return next(one.verdict for one in self.checks.verdicts() if one.name == name)
+        return next(verdict.verdict for verdict in self.checks.verdicts() if verdict.name == name)
 
     def result(self) -> Result:
         """Its verdict, and the lines of steps, checks and firmware faults."""
@@ -200,8 +200,8 @@ class Run:
             path=self.spec.origin,
             verdict=judge(parts),
             said=lines,
-            failures=[one for group in self.judges for one in group.failures],
-            expectations=[one for group in self.judges for one in group.verdicts()],
+            failures=[failure for group in self.judges for failure in group.failures],
+            expectations=[verdict for group in self.judges for verdict in group.verdicts()],
             done=0 if player is None else player.done,
             steps=0 if player is None else player.count,
             step_tick=-1 if player is None or player.failure is None else player.failure.tick,
@@ -276,11 +276,11 @@ class Run:
             again = Run(self.as_sent(expect)).play()
         except BadInput:
             return None
-        failure = next((one for one in again.failures if one.check in expect), None)
+        failure = next((failed for failed in again.failures if failed.check in expect), None)
         return None if failure is None else self.stream(expect, str(failure))
 
     def as_sent(self, expect: Mapping[str, Any]) -> RunSpec:
-        """The same run up to here, as what went into it: without hosts that compute, and without steps."""
+        """A spec that repeats the run up to here from its inputs: no controller computes, no step is done."""
         world = self.world
         scenario = msgspec.structs.replace(world.scenario, expect=dict(expect))
         if isinstance(scenario, BoardScenario):  # at the rate at which it was sent

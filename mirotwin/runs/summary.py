@@ -243,7 +243,7 @@ def vision_text(vision: VisionCounts) -> str:
         (vision.swapped, "robot SWAPPED", "robots SWAPPED"),
     )
     parts = [amount(vision.frames, "frame"), amount(vision.lost, "robot not found", "robots not found")]
-    return ", ".join(parts + [amount(*one) for one in happened if one[0]])
+    return ", ".join(parts + [amount(*counted) for counted in happened if counted[0]])
 
 
 def to_json(summary: msgspec.Struct) -> bytes:

@@ -176,7 +176,7 @@ class _Field(NamedTuple):
 
     @property
     def several(self) -> bool:
-        """Whether the value is a tuple of those on the command line."""
+        """True if the value is a tuple of those on the command line."""
         return self.declared.several if isinstance(self.declared, Argument) else self.default == ()
 
     @property
@@ -230,7 +230,9 @@ class _Field(NamedTuple):
 def _fields(record: type[Options]) -> tuple[_Field, ...]:
     fields = []
     for field in msgspec.structs.fields(record):
-        declared = next((one for one in get_args(field.type) if isinstance(one, Argument | Option)), None)
+        declared = next(
+            (argument for argument in get_args(field.type) if isinstance(argument, Argument | Option)), None
+        )
         nested = field.type if declared is None else None
         fields.append(_Field(field.name, declared, nested, field.default, field.required, record.HEADING))
     return tuple(fields)

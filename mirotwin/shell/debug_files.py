@@ -47,7 +47,7 @@ def with_debug_files(image: Image) -> Image:
 
 
 def is_robots_own(image: Image) -> bool:
-    """Whether an image is the robot's own firmware, whose C files are installed."""
+    """True if an image is the robot's own firmware, whose C files are installed."""
     return source_folder() is not None and load_firmware(named=False).sha256 == image.sha256
 
 
@@ -88,7 +88,7 @@ def debugged_image(image: Image, images: Sequence[Image], sources: Sequence[str]
 
     Raises BadInput for a folder that is not there.
     """
-    known = next((one for one in images if one.code == image.code), with_debug_files(image))
+    known = next((other for other in images if other.code == image.code), with_debug_files(image))
     return known, source_folders(known, sources)
 
 
@@ -129,8 +129,10 @@ def _from_here(sources: Sources, file: str) -> str:
     path = sources.path(file)
     if path is not None and path.is_relative_to(here):
         return path.relative_to(here).as_posix()
-    found = []
+    paths = []
     for above, folders, names in islice(os.walk(here), MOST_FOLDERS):
-        folders[:] = sorted(one for one in folders if not one.startswith(".") and one not in _SKIPPED)
-        found += [Path(above, name).relative_to(here).as_posix()] * (name in names)
-    return found[0] if len(found) == 1 else name
+        folders[:] = sorted(
+            folder for folder in folders if not folder.startswith(".") and folder not in _SKIPPED
+        )
+        paths += [Path(above, name).relative_to(here).as_posix()] * (name in names)
+    return paths[0] if len(paths) == 1 else name

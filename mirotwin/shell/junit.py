@@ -125,8 +125,8 @@ def read_junit(path: Path) -> list[ReadCase] | None:
 def _read_case(element: ElementTree.Element) -> ReadCase:
     name = one_line(element.get("name", ""))
     facts = {key: one_line(element.get(key, "")) for key in ("file", "line") if element.get(key)}
-    for one in element.iter("property"):
-        facts[one.get("name", "").removeprefix("mirotwin_")] = one_line(one.get("value", ""))
+    for fact in element.iter("property"):
+        facts[fact.get("name", "").removeprefix("mirotwin_")] = one_line(fact.get("value", ""))
     kind = next((kind for kind in _KINDS if element.find(kind) is not None), None)
     outcome = None if kind is None else element.find(kind)
     if kind is None or outcome is None:

@@ -64,7 +64,7 @@ class PluginFiles(Options, frozen=True, kw_only=True):
     def _settings(self, others: Sequence[str]) -> Iterator[str]:
         for registry in (LAWS, ESTIMATORS, REFERENCES):
             names = list(registry.in_files)
-            if len(names) == 1 and not any(re.search(rf"\b{re.escape(names[0])}\b", one) for one in others):
+            if len(names) == 1 and not any(re.search(rf"\b{re.escape(names[0])}\b", text) for text in others):
                 yield f"{registry.word}={names[0]}"
 
 
@@ -98,8 +98,8 @@ def _bring(registry: Registry[Any], given: Sequence[str], option: str) -> None:
                 check_struct(struct)
         tag = str(struct.__struct_config__.tag)
         if tag in registry.in_files:
-            what = f"there are two {registry.word}s {tag!r}"
-            raise BadInput(path, f"{option} {name}", what, "name one once")
+            problem = f"there are two {registry.word}s {tag!r}"
+            raise BadInput(path, f"{option} {name}", problem, "name one once")
         registry.in_files[tag] = struct
         sources = hashlib.sha256(Path(path).read_bytes()).hexdigest()[: installed.DIGITS]
         installed.in_files[registry.word, tag] = f"{Path(path).name}:{name}, sources {sources}"

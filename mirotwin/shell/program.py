@@ -93,7 +93,7 @@ def _in_words(error: click.UsageError) -> str:
     """What is wrong, in the house's words where an option's name is."""
     if not isinstance(error, click.NoSuchOption) or error.ctx is None:
         return error.format_message()
-    names = [name for one in error.ctx.command.get_params(error.ctx) for name in one.opts]
+    names = [name for parameter in error.ctx.command.get_params(error.ctx) for name in parameter.opts]
     hint = did_you_mean(error.option_name, [name for name in names if name.startswith("--")])
     reason = f"No such option {shortened(repr(error.option_name))}"
     return f"{reason}; {hint}" if hint else f"{reason}."
@@ -161,7 +161,7 @@ class LazyGroup(click.Group):
     def __init__(self, *args: Any, sections: Sections | None = None, **named: Any) -> None:
         super().__init__(*args, **named)
         self.sections = sections or {}
-        self.listed = {name: one for section in self.sections.values() for name, one in section.items()}
+        self.listed = {name: place for section in self.sections.values() for name, place in section.items()}
 
     def list_commands(self, ctx: click.Context) -> list[str]:
         return [*self.listed, *super().list_commands(ctx)]
@@ -193,7 +193,7 @@ class LazyGroup(click.Group):
         for heading, section in self.sections.items():  # without blank lines between: one screen
             formatter.write_heading(heading)
             with formatter.indentation():
-                formatter.write_dl([(name.ljust(width), _about(one)) for name, one in section.items()])
+                formatter.write_dl([(name.ljust(width), _about(place)) for name, place in section.items()])
 
 
 def _about(command: Lazy | click.Group) -> str:

@@ -23,8 +23,8 @@ class ProgressBar:
 
     PATIENCE_S = 1.0
 
-    def __init__(self, what: str, total: float | None, quiet: bool = False, unit: str = "") -> None:
-        self.what = one_line(what)
+    def __init__(self, task: str, total: float | None, quiet: bool = False, unit: str = "") -> None:
+        self.what = one_line(task)
         self.total = total
         self.unit = unit
         self.begun = 0
@@ -61,7 +61,7 @@ class ProgressBar:
     def _columns(self) -> list[ProgressColumn]:
         from rich.progress import BarColumn, TaskProgressColumn, TextColumn, TimeRemainingColumn
 
-        words, rate = (TextColumn(f"{{task.{one}}}", markup=False) for one in ("description", "fields[said]"))
+        words, rate = (TextColumn(f"{{task.{key}}}", markup=False) for key in ("description", "fields[said]"))
         return [words, BarColumn(), TaskProgressColumn(), rate if self.unit else TimeRemainingColumn()]
 
     def _rate(self, done: float) -> str:

@@ -51,7 +51,7 @@ def judge(verdicts: Iterable[str], unnamed: Iterable[str] = ()) -> Verdict:
 
     `unnamed`: of checks that nobody requested. One that had no occasion counts as one that cannot be observed.
     """
-    reported = {*verdicts, *("not observable" if one == "not judged" else one for one in unnamed)}
+    reported = {*verdicts, *("not observable" if unseen == "not judged" else unseen for unseen in unnamed)}
     return next((verdict for verdict in VERDICTS if verdict in reported), "passed")
 
 

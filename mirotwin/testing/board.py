@@ -127,8 +127,8 @@ class BoardUnderTest(DeviceUnderTest):
                 raise WaitFailed.of(expired, world, required) from None
             return
         expect = expect_of("never_happens", condition, begun_tick, max(event.tick, world.tick), True)
-        what = f"{required} for {for_ms:g} ms: broken"
-        raise WaitFailed(what, begun_tick, event.tick, [event], expect, world)
+        reason = f"{required} for {for_ms:g} ms: broken"
+        raise WaitFailed(reason, begun_tick, event.tick, [event], expect, world)
 
     def __repr__(self) -> str:
         return f"BoardUnderTest({self._device.board!r})"

@@ -80,12 +80,12 @@ class DeviceUnderTest:
         self.world.run_to(self.world.set_reset(0, self.network, self.slot))
 
     @shown_where_it_was_called
-    def fault(self, what: str) -> None:
+    def fault(self, hardware: str) -> None:
         """Breaks hardware, or mends it: "encoder left lost", as `fault` of steps. A test in which it changes nothing is
         not judged, and fails. Raises ValueError for what is no fault.
         """
-        fault = Fault(self.world.earliest_action_tick, self.network, self.slot, fault_text(what))
-        Proof.begin(self.proofs, self.world, f"fault {what}", fault)
+        fault = Fault(self.world.earliest_action_tick, self.network, self.slot, fault_text(hardware))
+        Proof.begin(self.proofs, self.world, f"fault {hardware}", fault)
         self.world.run_to(self.world.do(fault))
 
     def power_off(self) -> None:

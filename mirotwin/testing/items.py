@@ -182,8 +182,8 @@ def test_line(item: pytest.Item, seed: int) -> str:
     if (firmware := path_option(item.config, "firmware")) is not None:
         words += ["--mirotwin-firmware", _relative(item.config, firmware)]
     for kind in FILES_OF:
-        for one in item.config.getoption(f"--mirotwin-{kind}"):
-            words += [f"--mirotwin-{kind}", one]
+        for text in item.config.getoption(f"--mirotwin-{kind}"):
+            words += [f"--mirotwin-{kind}", text]
     for option in ("--mirotwin-port", "--mirotwin-allow-motion", "--mirotwin-max-speed"):
         if value := item.config.getoption(option):
             words += [option] if value is True else [option, f"{value}"]

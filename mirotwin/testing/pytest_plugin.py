@@ -143,19 +143,19 @@ def robot(robots: list[RobotUnderTest]) -> RobotUnderTest:
 @pytest.fixture
 def board(mirotwin_rig: Rig | PortRig) -> BoardUnderTest:
     """The board of the marker `mirotwin(board=, firmware=)`: puts, presses, pins, values, waits, memory."""
-    found: BoardUnderTest | None = getattr(mirotwin_rig, "board", None)
-    if found is None:
+    device: BoardUnderTest | None = getattr(mirotwin_rig, "board", None)
+    if device is None:
         pytest.fail(NO_BOARD, False)
-    return found
+    return device
 
 
 @pytest.fixture
 def serial(mirotwin_rig: Rig | PortRig) -> SerialUnderTest:
     """A terminal at the board's serial port: write, expect, read."""
-    found: SerialUnderTest | None = getattr(mirotwin_rig, "serial", None)
-    if found is None:
+    device: SerialUnderTest | None = getattr(mirotwin_rig, "serial", None)
+    if device is None:
         pytest.fail(NO_BOARD, False)
-    return found
+    return device
 
 
 # Judging and reporting

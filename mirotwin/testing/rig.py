@@ -99,7 +99,7 @@ class Rig:
 
     @property
     def written(self) -> bool:
-        """Whether the test wrote into a memory by itself: then nobody can run it again."""
+        """True if the test wrote into a memory by itself: then nobody can run it again."""
         return any(device.written for device in (*self.robots, *filter(None, [self.board])))
 
     def located(self, caught: BaseException | None, result: Result) -> Result:

@@ -78,7 +78,7 @@ def _check_key(key: str, value: Any) -> None:
     types, allowed = _TYPES[key]
     if not isinstance(value, types) or (key == "seed" and isinstance(value, bool)):
         raise BadInput("", MARKER, f"{key}={value!r}", f"give {allowed}")
-    if isinstance(value, list | tuple) and not all(isinstance(one, str) and "=" in one for one in value):
+    if isinstance(value, list | tuple) and not all(isinstance(item, str) and "=" in item for item in value):
         raise BadInput("", MARKER, f"settings={value!r}", f"give {allowed}")
 
 
@@ -106,7 +106,7 @@ def rig_options(
     image = image_for(text, _near(mark["firmware"], folder) if "firmware" in mark else firmware)
     scenario = msgspec.structs.replace(scenario, expect={**scenario.expect, **mark["expect"]})
     is_silent = not isinstance(scenario, BoardScenario) and all(
-        one.host == "silent" for one in scenario.networks
+        network.host == "silent" for network in scenario.networks
     )
     boot = mark.get("boot", is_silent)
     expected = expectations_of(scenario, scenario.name)

@@ -99,7 +99,7 @@ def check_options(config: pytest.Config) -> None:
         from mirotwin.shell.plugin_files import PluginFiles
 
         here = config.invocation_params.dir
-        files = {field: tuple(f"{Path(here, one)}" for one in listed) for field, listed in given.items()}
+        files = {field: tuple(f"{Path(here, name)}" for name in listed) for field, listed in given.items()}
         try:
             PluginFiles(**files).bring("--mirotwin-")
         except ValueError as error:

@@ -226,8 +226,8 @@ def init(options: InitOptions) -> None:
     known, it says what to write there, and CI fails with that.
     """
     folder, remedy = options.folder, "name a folder that is new or empty"
-    found = board_files(options.board) if options.board else project_files(not options.without_firmware)
-    files = {name: path.read_bytes() for name, path in found}
+    sources = board_files(options.board) if options.board else project_files(not options.without_firmware)
+    files = {name: path.read_bytes() for name, path in sources}
     line = origin.given(options.source, folder) if options.source else origin.installed(folder)
     if line is not None:
         text = files[REQUIREMENTS].decode()

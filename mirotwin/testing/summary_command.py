@@ -141,4 +141,6 @@ def annotation(case: ReadCase) -> str:
 
 def _escaped(text: str, more: str = "") -> str:
     """As GitHub's toolkit escapes a message, and in a property `:` and `,` too."""
-    return "".join(f"%{ord(one):02X}" if one in f"%\r\n{more}" else one for one in text)
+    return "".join(
+        f"%{ord(character):02X}" if character in f"%\r\n{more}" else character for character in text
+    )

@@ -86,5 +86,5 @@ def _as_test(path: str, result: Result) -> Result:
     if result.verdict in ("passed", "differs"):
         notes: list[Line] = [("passed", text) for text in result.texts[1:]]
         return replace(result, path=path, verdict="passed", said=notes)
-    lines: list[Line] = [("failed", f"expectation failed: {one}") for one in result.failures]
+    lines: list[Line] = [("failed", f"expectation failed: {failure}") for failure in result.failures]
     return replace(result, path=path, said=lines or result.said)

@@ -34,7 +34,7 @@ class WaitFailed(AssertionError):
 
     def __init__(
         self,
-        what: str,
+        reason: str,
         begun_tick: int,
         tick: int,
         seen: Sequence[Event],
@@ -49,14 +49,14 @@ class WaitFailed(AssertionError):
         times = f"from {at(begun_tick, clock)} to {at(tick, clock)}"
         happened = "\n".join(f"  {line}" for line in in_words(seen, machine)[-LAST_LINES:]) or "  nothing"
         count = f", {amount(len(seen), 'event')}" if len(seen) > LAST_LINES else ""
-        super().__init__(f"{what}, {times}; meanwhile{count}:\n{happened}")
+        super().__init__(f"{reason}, {times}; meanwhile{count}:\n{happened}")
 
     @classmethod
     def of(
         cls,
         expired: WaitExpired,
         machine: Machine,
-        what: str = "",
+        reason: str = "",
         begun_tick: int | None = None,
         before: Sequence[Event] = (),
         judged: bool = True,
@@ -67,8 +67,8 @@ class WaitFailed(AssertionError):
         a check can say the same.
         """
         begun_tick = expired.begun_tick if begun_tick is None else begun_tick
-        what = what or f"no {' or '.join(map(str, expired.conditions))}"
-        what += f", found {expired.found}" if expired.found else ""
+        reason = reason or f"no {' or '.join(map(str, expired.conditions))}"
+        reason += f", found {expired.found}" if expired.found else ""
         why = f": {why_ended(machine)}" if machine.finished else ""
         seen = [event for event in (*before, *expired.seen) if event.tick >= begun_tick]
         seen.sort(key=lambda event: event.tick)
@@ -76,7 +76,7 @@ class WaitFailed(AssertionError):
         if judged and len(expired.conditions) == 1:
             alone = not machine.networks
             expect = expect_of("happens", expired.conditions[0], begun_tick, expired.tick, alone)
-        return cls(f"{what}{why}", begun_tick, expired.tick, seen, expect, machine)
+        return cls(f"{reason}{why}", begun_tick, expired.tick, seen, expect, machine)
 
 
 def why_ended(machine: Machine) -> str:
@@ -111,7 +111,7 @@ def _with_frames(events: Sequence[Event]) -> list[Event]:
         decoders: list[Scanner] = [Decoder(3), Decoder(5)] if kind == "received" else [TelemetryDecoder()]
         for decoder in decoders:
             start = 0
-            symbols = [(one.value, one.good_stop, one.tick) for one in map(events.__getitem__, wire)]
+            symbols = [(each.value, each.good_stop, each.tick) for each in map(events.__getitem__, wire)]
             for decoded in [*decoder.feed_symbols(symbols), *decoder.flush()]:
                 characters = wire[start : start + len(decoded.data)]
                 start += len(decoded.data)
@@ -120,7 +120,7 @@ def _with_frames(events: Sequence[Event]) -> list[Event]:
                     last = characters[-1]
                     replaced[last] = msgspec.structs.replace(events[last], frame=decoded)
     all_ = (replaced.get(index, event) for index, event in enumerate(events))
-    return [one for one in all_ if one is not None]
+    return [each for each in all_ if each is not None]
 
 
 def _frame_text(event: Event) -> str:
@@ -162,7 +162,7 @@ def _line(run: Sequence[Event], machine: Machine | None) -> str:
     elif first.what == "sent":
         text += f": {_sent_text(first)}"
     elif len(run) > 1:
-        values = " ".join(f"{one.value:02X}{'' if one.good_stop else '!'}" for one in run)
+        values = " ".join(f"{character.value:02X}{'' if character.good_stop else '!'}" for character in run)
         text, when = f"{first.what} {values}", "from tick"
     return f"{first.tick * 1000 / clock:10.3f} ms {where}: {text} ({when} {first.tick})"
 

@@ -1,4 +1,4 @@
-"""Whether a hardware fault changed anything: a twin goes on without it from the same state, and is compared.
+"""True if a hardware fault changed anything: a twin goes on without it from the same state, and is compared.
 
 Each digest holds the one before and the state at the end of a control period; armed faults are no part of it. Up to the
 fault both have the same, so their digests differ from the first period on at whose end their states do.

@@ -32,11 +32,11 @@ def as_settings(expected: Sequence[str], files: bool = True) -> tuple[str, ...]:
     BadInput for what is no check, and where `files` are of no use.
     """
     named = [_IN_FILE.fullmatch(text) or text for text in expected]
-    if not files and any(not isinstance(one, str) for one in named):
+    if not files and any(not isinstance(item, str) for item in named):
         remedy = "`mirotwin examples checks` writes a check of your own to pip install"
         raise BadInput("", EXPECT.names[0], "runs of other processes name checks that are installed", remedy)
     CHECKS.in_files.clear()
-    keys = [one if isinstance(one, str) else f"{_brought(one[1], one[2])}{one[3]}" for one in named]
+    keys = [item if isinstance(item, str) else f"{_brought(item[1], item[2])}{item[3]}" for item in named]
     return tuple(f"{EXPECT_KEY}{key}" if "=" in key else f"{EXPECT_KEY}{key}=true" for key in keys)
 
 

@@ -119,12 +119,12 @@ def put_of(tick: int, network: int, slot: int, text: str) -> Put:
     if not equals or not PUT_PATH.fullmatch(path):
         raise ValueError(f"{text[:40]!r} is not PART.KEY = VALUE; {_HOW_TO_PUT}")
     try:
-        found = tables(f"value = {value}")
+        parsed = tables(f"value = {value}")
     except TomlError:
-        found = {}
-    if list(found) != ["value"] or not isinstance(found["value"], PutValue):
+        parsed = {}
+    if list(parsed) != ["value"] or not isinstance(parsed["value"], PutValue):
         raise ValueError(f"{value[:40]!r} is no number, text or boolean; {_HOW_TO_PUT}")
-    put = Put(tick, network, slot, path, found["value"])
+    put = Put(tick, network, slot, path, parsed["value"])
     put.text  # noqa: B018 - raises for a number that cannot be used
     return put
 

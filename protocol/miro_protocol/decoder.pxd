@@ -31,7 +31,7 @@ cdef class Scanner:
     cdef int _put(self, int byte, bint bad_stop, long long tick) noexcept
     @cython.locals(byte='unsigned int', register='unsigned int')
     cdef int _test(self, int start) noexcept
-    cdef _give_out(self, int found, list events)
+    cdef _give_out(self, int kind, list events)
     cdef void _read_body(self, int sync) noexcept
     cdef int _lead_start(self, int sync) noexcept
     cdef _give_out_damaged(self, int length, list events)

@@ -115,13 +115,13 @@ class Scanner:
 
         For who judges millions of frames; `tick` is that of the start bit, below 2^62.
         """
-        found = self._put(byte, bad_stop, tick)
-        if found == _FRAME:
+        kind = self._put(byte, bad_stop, tick)
+        if kind == _FRAME:
             self._read_body(self._count - self._size)
             self._clear()
-        elif found:
-            self._give_out(found, [])
-        return found == _FRAME
+        elif kind:
+            self._give_out(kind, [])
+        return kind == _FRAME
 
     @property
     def pending(self) -> int:
@@ -139,9 +139,9 @@ class Scanner:
         checked_tick(tick, len(data) * self._step)
         view = memoryview(data)
         for place in range(len(data)):
-            found = self._put(view[place], False, tick)
-            if found:
-                self._give_out(found, events)
+            kind = self._put(view[place], False, tick)
+            if kind:
+                self._give_out(kind, events)
             tick += self._step
         return events
 
@@ -159,9 +159,9 @@ class Scanner:
             if not least <= start_tick <= most:
                 checked_tick(start_tick, self._step)
             tick = start_tick
-            found = self._put(byte, not stop_good, tick)
-            if found:
-                self._give_out(found, events)
+            kind = self._put(byte, not stop_good, tick)
+            if kind:
+                self._give_out(kind, events)
         return events
 
     def gap(self) -> None:
@@ -247,8 +247,8 @@ class Scanner:
         self.rejected += 1
         return _BAD_CRC
 
-    def _give_out(self, found: int, events: list[Event]) -> None:
-        if found == _RUN:
+    def _give_out(self, kind: int, events: list[Event]) -> None:
+        if kind == _RUN:
             self._give_out_damaged(self._run_limit, events)
             return
         sync = self._count - self._size

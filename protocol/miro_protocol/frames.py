@@ -128,11 +128,11 @@ def _whole(name: str, value: Any, allowed: str) -> int:
     raise EncodeError(f"{name} = {_shown(value)}: must be a whole number {allowed}")
 
 
-def _items(name: str, value: Any, count: int, what: str) -> tuple[Any, ...]:
+def _items(name: str, value: Any, count: int, content: str) -> tuple[Any, ...]:
     """The `count` items of `value`, anything of a length and an order."""
     ordered = type(value) is tuple or (isinstance(value, Collection) and not isinstance(value, Set | Mapping))
     if not ordered or len(value) != count:
-        raise EncodeError(f"{name.strip()} = {_shown(value)}: must be {count} {what}")
+        raise EncodeError(f"{name.strip()} = {_shown(value)}: must be {count} {content}")
     return tuple(value)
 
 
@@ -184,8 +184,8 @@ def _body(message: Any, n: int, form: Format) -> bytes:
     elif isinstance(message, TelemetryFrame):
         kind, payload = FrameType.TELEMETRY, _telemetry_payload(message, n)
     else:
-        what = "must be a TeamFrame, ServiceFrame or TelemetryFrame"
-        raise EncodeError(f"message = {_shown(message)}: {what}")
+        problem = "must be a TeamFrame, ServiceFrame or TelemetryFrame"
+        raise EncodeError(f"message = {_shown(message)}: {problem}")
     header = kind * SEQ_MODULUS + checked(SEQ, message.seq)
     return bytes([header]) + payload.ljust(form.payload_size, b"\0")
 
@@ -251,10 +251,10 @@ def _require_sendable(message: Message, body: bytes, n: int) -> None:
 
 
 def _team_type(kind: int) -> int:
-    what = f"{FrameType.TEAM:d} or {FrameType.TEAM_ASK:d}"
-    number = _whole("type", kind, what)
+    choices = f"{FrameType.TEAM:d} or {FrameType.TEAM_ASK:d}"
+    number = _whole("type", kind, choices)
     if number not in (FrameType.TEAM, FrameType.TEAM_ASK):
-        raise EncodeError(f"type = {_shown(kind)}: a team frame has type {what}")
+        raise EncodeError(f"type = {_shown(kind)}: a team frame has type {choices}")
     return number
 
 
@@ -274,8 +274,8 @@ def _service_payload(message: ServiceFrame, n: int) -> bytes:
     number = Opcode(checked(opcode, message.opcode))
     head = pack(slot, message.slot, high=n - 1) + pack(opcode, number)
     fields = SERVICE_DATA[number]
-    what = f"numbers ({', '.join(field.name for field in fields)})" if fields else "numbers"
-    values = _items(f"{number.name.lower()} values", message.values, len(fields), what)
+    content = f"numbers ({', '.join(field.name for field in fields)})" if fields else "numbers"
+    values = _items(f"{number.name.lower()} values", message.values, len(fields), content)
     return head + b"".join(pack(*pair) for pair in zip(fields, values, strict=True))
 
 

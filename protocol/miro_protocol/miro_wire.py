@@ -26,16 +26,16 @@ class Miro(Protocol, frozen=True, tag="miro"):
 
     def decode(self, wire: bytes) -> list[Frame | Damage]:
         decoder = Decoder(self.robots)
-        found: list[Frame | Damage] = []
+        items: list[Frame | Damage] = []
         at = 0
         for event in (*decoder.feed(wire), *decoder.flush()):
             end = at + len(event.data)
             if isinstance(event, Damaged):
-                found.append(Damage(at, end, event.reason.name.lower().replace("_", " ")))
+                items.append(Damage(at, end, event.reason.name.lower().replace("_", " ")))
             else:
-                found.append(Frame(event.body, at, end))
+                items.append(Frame(event.body, at, end))
             at = end
-        return found
+        return items
 
     def repair(self, body: bytes, number: int | None = None) -> bytes:
         """Cuts or fills with zeros."""
@@ -56,5 +56,5 @@ class Miro(Protocol, frozen=True, tag="miro"):
             ServiceFrame.filter(4, 0, 100, 10, 1000, 50),
             ServiceFrame.acceleration(5, 0, DEFAULT_ACCELERATION),
         )
-        events = Decoder(self.robots).feed(b"".join(encode(one, self.robots) for one in messages))
+        events = Decoder(self.robots).feed(b"".join(encode(message, self.robots) for message in messages))
         return tuple(event.body for event in events if not isinstance(event, Damaged))

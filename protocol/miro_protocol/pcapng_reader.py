@@ -167,8 +167,8 @@ class _BlockReader:
             "the file ends in the middle of a block", "it was cut short; capture or copy it again"
         )
 
-    def malformed(self, what: str) -> CaptureError:
-        return self.error(f"damaged block: {what}", "copy the file again")
+    def malformed(self, problem: str) -> CaptureError:
+        return self.error(f"damaged block: {problem}", "copy the file again")
 
     def _block(self, head: bytes) -> tuple[int, bytes]:
         """Kind and body of the block at `offset` which begins with `head`, its lengths checked."""
@@ -215,7 +215,7 @@ class _BlockReader:
         offset = options.get(IF_TSOFFSET, bytes(8))
         if len(offset) != 8:
             raise self.malformed("time offset of wrong length")
-        number = sum(_is_serial(one.link_type) for one in self.interfaces)
+        number = sum(_is_serial(interface.link_type) for interface in self.interfaces)
         return _Interface(link_type, units, struct.unpack(self.order + "q", offset)[0], number)
 
     def _options(self, data: bytes) -> Iterator[tuple[int, bytes]]:
@@ -250,16 +250,16 @@ class _BlockReader:
             if len(flags) == 4:
                 direction = _FLAG_DIRECTIONS.get(struct.unpack(self.order + "I", flags)[0] & 3, "")
         try:
-            found = _characters(interface.link_type, body[20 : 20 + size], direction, self.passed_over)
+            characters = _characters(interface.link_type, body[20 : 20 + size], direction, self.passed_over)
         except ValueError as error:
             raise self.malformed(f"{error}") from None
-        if found is None:
+        if characters is None:
             return None
         tick = -(-(high << 32 | low) * TICKS_PER_SECOND // interface.units)
         tick += interface.offset * TICKS_PER_SECOND
         if not 0 <= tick <= MAX_TICK:
             raise self.malformed(f"tick {tick} is not in 0..{MAX_TICK}")
-        return Transmission(tick, *found, interface.number)
+        return Transmission(tick, *characters, interface.number)
 
 
 class _PcapReader:
@@ -294,12 +294,12 @@ class _PcapReader:
                     f"only {size} of {original} bytes were captured", "capture without a snap length"
                 )
             try:
-                found = _characters(link_type, packet, "", self.passed_over)
+                characters = _characters(link_type, packet, "", self.passed_over)
             except ValueError as error:
                 raise self.error(f"damaged packet: {error}", "copy the file again") from None
-            if found is not None:
+            if characters is not None:
                 tick = -(-(seconds * units + part) * TICKS_PER_SECOND // units)
-                yield Transmission(tick, *found)
+                yield Transmission(tick, *characters)
             self.offset += 16 + size
 
     def error(self, reason: str, remedy: str) -> CaptureError:

@@ -42,7 +42,7 @@ class Freshness:
         return f"<freshness: {self.accepted} accepted, {self.stale} stale, last seq {self.last_seq}>"
 
     def judge(self, seq: int, tick: int) -> bool:
-        """Whether the valid frame `seq`, complete at `tick` (24 MHz), is fresh; once for every one."""
+        """True if the valid frame `seq`, complete at `tick` (24 MHz), is fresh; once for every one."""
         fresh = self._is_fresh(seq, tick)
         if fresh:
             self.accepted += 1
@@ -89,6 +89,6 @@ class RobotReceiver:
 
     def _judged(self, events: Iterable[Event]) -> list[Reception]:
         return [
-            (one, self.freshness.judge(one.seq, one.last_tick) if isinstance(one, Received) else None)
-            for one in events
+            (event, self.freshness.judge(event.seq, event.last_tick) if isinstance(event, Received) else None)
+            for event in events
         ]

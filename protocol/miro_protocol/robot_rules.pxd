@@ -35,7 +35,7 @@ cdef class OriginRule:
     cdef readonly object frames
 
     cpdef team(self, long long tick, int left, int right)
-    @cython.locals(begun='long long', one=int, other=int, found=bint)
+    @cython.locals(begun='long long', sent_left=int, sent_right=int, allowed=bint)
     cpdef bint allows(self, long long tick, int left, int right) except -1
 
 

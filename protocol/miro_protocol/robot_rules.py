@@ -74,15 +74,15 @@ class SilenceRule:
         return latest + _TESTING if begun <= self.received_tick <= latest else latest
 
     def is_over(self, tick: int) -> bool:
-        """Whether at `tick` both wheels had to have gone over."""
+        """True if at `tick` both wheels had to have gone over."""
         return self.last_tick >= 0 and tick > self.latest_tick() and tick > self.deadline()
 
     def is_judged(self, tick: int) -> bool:
-        """Whether a wheel that goes over at `tick` does so in silence: right after a frame it does what that says."""
+        """True if a wheel that goes over at `tick` does so in silence: right after a frame it does what that says."""
         return self.last_tick >= 0 and tick - self.end_tick() > _ACTING
 
     def is_early(self, tick: int) -> bool:
-        """Whether a wheel that goes over at `tick` does so too early."""
+        """True if a wheel that goes over at `tick` does so too early."""
         return self.is_judged(tick) and tick < self.earliest_tick()
 
 
@@ -107,7 +107,7 @@ class DrivingRule:
         self.waiting.clear()
 
     def may_move(self, tick: int) -> bool:
-        """Whether a wheel may be told to turn at `tick`."""
+        """True if a wheel may be told to turn at `tick`."""
         return self.fresh_tick >= 0 and tick - self.fresh_tick <= self.within_ticks
 
     def team(self, tick: int, left: int, right: int) -> None:
@@ -127,9 +127,9 @@ class DrivingRule:
         """(deadline, left, right) of a frame that was not obeyed before `tick`; it waits no longer."""
         if tick <= self.deadline:
             return None
-        found = self.waiting.pop(0)
+        overdue = self.waiting.pop(0)
         self.deadline = self.waiting[0][0] if self.waiting else _NEVER
-        return found
+        return overdue
 
 
 class OriginRule:
@@ -146,13 +146,13 @@ class OriginRule:
         self.frames.append((tick, left, right))
 
     def allows(self, tick: int, left: int, right: int) -> bool:
-        """Whether the wheels may be told this at `tick`, which does not go back."""
+        """True if the wheels may be told this at `tick`, which does not go back."""
         while self.frames and self.frames[0][0] < tick - self.within_ticks:
             self.frames.popleft()
-        found = False
-        for begun, one, other in self.frames:
-            found = found or (begun <= tick and one == left and other == right)
-        return found
+        allowed = False
+        for begun, sent_left, sent_right in self.frames:
+            allowed = allowed or (begun <= tick and sent_left == left and sent_right == right)
+        return allowed
 
 
 class AnswerRule:

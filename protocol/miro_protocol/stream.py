@@ -64,8 +64,8 @@ def characters(entry: Entry, source: str) -> Transmission:
     """The transmission in a line. Raises StreamError for an action, which says who can act on it."""
     if isinstance(entry.what, Transmission):
         return entry.what
-    what = "an action, which this command does not support"
-    raise StreamError(source, entry.line, 1, what, WHO_CAN[type(entry.what)])
+    problem = "an action, which this command does not support"
+    raise StreamError(source, entry.line, 1, problem, WHO_CAN[type(entry.what)])
 
 
 class Reader:
@@ -142,8 +142,8 @@ def format_stream(lines: Iterable[Entry | StreamItem], header: Header | None = N
     """The whole file. ValueError for what could not be read back, and when ticks go backwards."""
     written, last = [], 0
     version = 1 if header is None or not header.text else header.needed_version
-    for one in lines:
-        entry = one if isinstance(one, Entry) else Entry(one)
+    for item in lines:
+        entry = item if isinstance(item, Entry) else Entry(item)
         written.append(format_line(entry.what, entry.comment))
         if entry.what.tick < last:
             raise ValueError(

@@ -102,8 +102,8 @@ class _Document:
             if key not in KEYS:
                 remedy = did_you_mean(key, KEYS, f"a header has {', '.join(KEYS)}")
                 self._fail(*self._place(key), f"unknown key {key[:40]!r}", remedy)
-        found = {key: self._value(key, value) for key, value in raw.items()}
-        return Header(text=text, **found)
+        values = {key: self._value(key, value) for key, value in raw.items()}
+        return Header(text=text, **values)
 
     def _value(self, key: str, value: Any) -> Any:
         try:

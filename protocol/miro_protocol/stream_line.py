@@ -86,21 +86,21 @@ class Entry:
     line: int = field(default=0, compare=False)
 
 
-def version_of(what: StreamItem) -> int:
+def version_of(item: StreamItem) -> int:
     """The first version that has words for it."""
-    if isinstance(what, Put | Reseed | Fault):
+    if isinstance(item, Put | Reseed | Fault):
         return 3
-    return 2 if not isinstance(what, Transmission) or what.network or what.bad_stop else 1
+    return 2 if not isinstance(item, Transmission) or item.network or item.bad_stop else 1
 
 
-def format_line(what: StreamItem, comment: str = "") -> str:
+def format_line(item: StreamItem, comment: str = "") -> str:
     """The line without its newline. ValueError when it could not be read back as the same."""
-    if not 0 <= what.tick <= MAX_TICK:
-        raise ValueError(f"tick = {what.tick}: must be 0..{MAX_TICK}")
+    if not 0 <= item.tick <= MAX_TICK:
+        raise ValueError(f"tick = {item.tick}: must be 0..{MAX_TICK}")
     if comment != comment.strip() or "\n" in comment:
         raise ValueError(f"comment = {comment!r}: must be one line without blanks around it")
-    said = _characters(what) if isinstance(what, Transmission) else _action(what)
-    line = f"{what.tick} {said}"
+    said = _characters(item) if isinstance(item, Transmission) else _action(item)
+    line = f"{item.tick} {said}"
     return f"{line}  # {comment}" if comment else line
 
 
@@ -171,14 +171,14 @@ class StreamLine:
 
     def version(self) -> int:
         """What the first line of a file says; 1 if it says nothing."""
-        found = _VERSION.match(self.text)
-        if found is None:
+        match = _VERSION.match(self.text)
+        if match is None:
             return 1
-        version = found[1].rstrip()
+        version = match[1].rstrip()
         if version not in map(str, VERSIONS):
             reason = f"stream version {brief(version or 'missing')}"
             remedy = "this program reads versions 1 to 3; use the one that wrote it"
-            raise self.error(found.start(1) + 1, reason, remedy)
+            raise self.error(match.start(1) + 1, reason, remedy)
         return int(version)
 
     def parse(self, version: int, crystal_hz: int = TICKS_PER_SECOND) -> Entry | None:
@@ -188,10 +188,10 @@ class StreamLine:
         tick = self._tick(self.tokens[0], crystal_hz)
         kind, network, slot = self._place(version)
         if kind == HAND:
-            what: StreamItem = self._read_action(tick, network, slot, version)
+            item: StreamItem = self._read_action(tick, network, slot, version)
         else:
-            what = self._read_characters(tick, kind, network or 0, version)
-        return Entry(what, self.comment, self.number)
+            item = self._read_characters(tick, kind, network or 0, version)
+        return Entry(item, self.comment, self.number)
 
     def _tick(self, token: re.Match[str], crystal_hz: int) -> int:
         tick = tick_of(token[0], crystal_hz)
@@ -206,13 +206,13 @@ class StreamLine:
         if len(self.tokens) == 1:
             raise self.error(self.end, "no direction", remedy)
         token = self.tokens[1]
-        found = _PLACE.fullmatch(token[0])
-        if found is None or (found[3] is not None and found[1] != HAND):
+        match = _PLACE.fullmatch(token[0])
+        if match is None or (match[3] is not None and match[1] != HAND):
             raise self.error(token, f"{brief(token[0])} is not a direction", remedy)
         if version == 1 and token[0] not in DIRECTIONS:
             raise self._too_new(token, version, 2)
-        network = self._number(token, found[2], "network", MAX_NETWORK)
-        return found[1], network, self._number(token, found[3], "slot", MAX_SLOT)
+        network = self._number(token, match[2], "network", MAX_NETWORK)
+        return match[1], network, self._number(token, match[3], "slot", MAX_SLOT)
 
     def _number(self, token: re.Match[str], digits: str | None, name: str, high: int) -> int | None:
         if digits is not None and int(digits) > high:
@@ -228,15 +228,15 @@ class StreamLine:
             raise self.error(self.end, "no characters", "write at least one as two hex digits")
         data, bad_stop = bytearray(), []
         for token in self.tokens[2:]:
-            found = _CHARACTER.fullmatch(token[0])
-            if found is None:
+            match = _CHARACTER.fullmatch(token[0])
+            if match is None:
                 reason = f"{brief(token[0])} is not a character"
                 raise self.error(token, reason, "write two hex digits each, with blanks between")
-            if found[2]:
+            if match[2]:
                 if version == 1:
                     raise self._too_new(token, version, 2)
                 bad_stop.append(len(data))
-            data.append(int(found[1], 16))
+            data.append(int(match[1], 16))
         return Transmission(tick, direction, bytes(data), network, tuple(bad_stop))
 
     def _read_action(

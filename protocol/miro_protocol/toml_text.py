@@ -40,11 +40,13 @@ _PLACE = re.compile(r"(.*?) \(at (?:line (\d+), column (\d+)|end of document)\)$
 class TomlError(BadInput):
     """A document, which its reader names, that cannot be used. `line`, `column`: where, from 1; 0: not known."""
 
-    def __init__(self, what: str, remedy: str = "", place: str = "", line: int = 0, column: int = 0) -> None:
+    def __init__(
+        self, problem: str, remedy: str = "", place: str = "", line: int = 0, column: int = 0
+    ) -> None:
         self.line = line
         self.column = column
         at = [f"line {line}"] * bool(line) + [f"column {column}"] * bool(column)
-        super().__init__("", place or ", ".join(at), what, remedy)
+        super().__init__("", place or ", ".join(at), problem, remedy)
 
 
 def tables(text: str) -> dict[str, Any]:
@@ -54,10 +56,10 @@ def tables(text: str) -> dict[str, Any]:
     try:
         return tomllib.loads(text)
     except tomllib.TOMLDecodeError as error:
-        found = _PLACE.match(f"{error}")
-        what, line, column = found.groups() if found else (f"{error}", None, None)
+        match = _PLACE.match(f"{error}")
+        problem, line, column = match.groups() if match else (f"{error}", None, None)
         end = text.count("\n") + 1
-        raise TomlError(f"not TOML: {what}", line=int(line or end), column=int(column or 0)) from None
+        raise TomlError(f"not TOML: {problem}", line=int(line or end), column=int(column or 0)) from None
     except RecursionError:
         raise TomlError("nested too deeply", "tables have at most 5 levels") from None
     except ValueError:  # more digits than Python converts
@@ -68,24 +70,24 @@ def check_size(text: str) -> None:
     """Refuses what would take `tomllib` minutes. Raises TomlError."""
     if len(text) > TEXT_KIB << 10:
         raise TomlError(f"holds more than {TEXT_KIB} KiB", "is this the right file?")
-    found = _LONG_KEY.search(text)
-    if found is not None:
-        line = text.count("\n", 0, found.start()) + 1
-        what, remedy = f"a key of more than {KEY_PARTS} parts", "remove it; no key has more than 6"
-        raise TomlError(what, remedy, line=line)
+    match = _LONG_KEY.search(text)
+    if match is not None:
+        line = text.count("\n", 0, match.start()) + 1
+        problem, remedy = f"a key of more than {KEY_PARTS} parts", "remove it; no key has more than 6"
+        raise TomlError(problem, remedy, line=line)
 
 
 def value_of(text: str, path: str) -> Any:
     """What a text means as the value of the key at `path`: as TOML, or itself if it is none. Raises TomlError."""
     check_size(f"{path} = {text}")
     try:
-        found = tomllib.loads(f"value = {text}")
+        parsed = tomllib.loads(f"value = {text}")
     except ValueError:  # no TOML, or an integer with more digits than Python converts
         return text
-    if len(found) > 1:
+    if len(parsed) > 1:
         return text
-    check_numbers(found["value"], path)
-    return found["value"]
+    check_numbers(parsed["value"], path)
+    return parsed["value"]
 
 
 def check_numbers(value: Any, path: str = "") -> None:
@@ -108,16 +110,16 @@ def struct_of(table: Any, kind: type[T], strict: bool = True) -> T:
         return msgspec.convert(table, kind, strict=strict)
     except msgspec.ValidationError as error:
         message = f"{error}"
-    what, path = what_and_path(message)
+    problem, path = what_and_path(message)
     keys = () if path else getattr(kind, "__struct_encode_fields__", ())
-    raise _misfit(what, _with_names(path, table, kind, message), keys)
+    raise _misfit(problem, _with_names(path, table, kind, message), keys)
 
 
 def what_and_path(message: str) -> tuple[str, str]:
     """What msgspec found, and the path of the key, without its `$`."""
-    found = re.fullmatch(r"(?s)(.*?)(?: - at `(?:\$|key in )?\.?(.*)`)?", message)
-    assert found is not None
-    return found[1], found[2] or ""
+    match = re.fullmatch(r"(?s)(.*?)(?: - at `(?:\$|key in )?\.?(.*)`)?", message)
+    assert match is not None
+    return match[1], match[2] or ""
 
 
 def _with_names(path: str, table: Any, kind: type, message: str) -> str:
@@ -147,24 +149,24 @@ def _fault(table: Any, kind: type) -> str:
     return ""
 
 
-def _misfit(what: str, path: str, keys: Sequence[str]) -> TomlError:
+def _misfit(problem: str, path: str, keys: Sequence[str]) -> TomlError:
     """What msgspec found, in the words of the file. `keys`: those of the table, if they are known."""
-    field = re.fullmatch(r"(?s)Object (contains unknown|missing required) field `(.*)`", what)
+    field = re.fullmatch(r"(?s)Object (contains unknown|missing required) field `(.*)`", problem)
     if field is not None:
         place = f"{path}.{field[2]}" if path else field[2]
         if field[1] == "missing required":
             return TomlError("this key is missing", "add it", place)
         known = f"keys here: {', '.join(keys)}" if keys else "remove or correct it"
         return TomlError("unknown key", did_you_mean(field[2], keys) or known, place)
-    limit = re.fullmatch(r"Expected `\w+` (>=|>|<=|<) (\S+)", what)
+    limit = re.fullmatch(r"Expected `\w+` (>=|>|<=|<) (\S+)", problem)
     if limit is not None:
         return TomlError("is out of range", f"must be {limit[1]} {limit[2]}", path)
-    wrong = re.fullmatch(r"Expected `([\w |]+)`, got `(\w+)`", what)
+    wrong = re.fullmatch(r"Expected `([\w |]+)`, got `(\w+)`", problem)
     if wrong is not None:
         wanted = " or ".join(TYPE_NAMES.get(name, name) for name in wrong[1].split(" | ") if name != "null")
-        what = f"expected {wanted}, got {TYPE_NAMES.get(wrong[2], wrong[2])}"
-    what, _, remedy = what.replace("`", "").partition("; ")
-    return TomlError(what[:1].lower() + what[1:], remedy or "mend the value", path)
+        problem = f"expected {wanted}, got {TYPE_NAMES.get(wrong[2], wrong[2])}"
+    problem, _, remedy = problem.replace("`", "").partition("; ")
+    return TomlError(problem[:1].lower() + problem[1:], remedy or "mend the value", path)
 
 
 def without_none(value: Any) -> Any:

@@ -59,13 +59,13 @@ def check_bad_stop(bad_stop: tuple[int, ...], count: int) -> None:
     before = -1
     for index in bad_stop:
         if not before < index < count:
-            what = f"bad_stop holds {index} behind {before}" if before >= 0 else f"bad_stop holds {index}"
-            raise ValueError(f"{what}: must be ascending indices of {count} characters")
+            problem = f"bad_stop holds {index} behind {before}" if before >= 0 else f"bad_stop holds {index}"
+            raise ValueError(f"{problem}: must be ascending indices of {count} characters")
         before = index
 
 
 def follows(last_tick: int, tick: int) -> bool:
-    """Whether characters that begin at these ticks follow each other without a pause, as receivers judge it."""
+    """True if characters that begin at these ticks follow each other without a pause, as receivers judge it."""
     return _FOLLOWS_FROM <= tick - last_tick <= _FOLLOWS_TO
 
 
@@ -77,13 +77,13 @@ def of_symbols(
     `spacing_ticks`: from one start bit to the next without a pause.
     """
     tolerance_ticks = SPACING_TOLERANCE_TICKS * spacing_ticks // SPACING_TICKS
-    found: list[Transmission] = []
+    transmissions: list[Transmission] = []
     data = bytearray()
     bad_stop: list[int] = []
     start_tick = last_tick = 0
     for byte, stop_good, tick in symbols:
         if data and abs(tick - last_tick - spacing_ticks) > tolerance_ticks:
-            found.append(Transmission(start_tick, direction, bytes(data), network, tuple(bad_stop)))
+            transmissions.append(Transmission(start_tick, direction, bytes(data), network, tuple(bad_stop)))
             data, bad_stop = bytearray(), []
         if not data:
             start_tick = tick
@@ -92,16 +92,16 @@ def of_symbols(
         data.append(byte)
         last_tick = tick
     if data:
-        found.append(Transmission(start_tick, direction, bytes(data), network, tuple(bad_stop)))
-    return found
+        transmissions.append(Transmission(start_tick, direction, bytes(data), network, tuple(bad_stop)))
+    return transmissions
 
 
-def joined(one: Transmission, other: Transmission) -> Transmission | None:
+def joined(first: Transmission, other: Transmission) -> Transmission | None:
     """Both as one transmission, or None unless `other` goes on where `one` ends."""
-    step = character_ticks(one.direction)
-    if (one.network, one.direction) != (other.network, other.direction):
+    step = character_ticks(first.direction)
+    if (first.network, first.direction) != (other.network, other.direction):
         return None
-    if not follows(one.end_tick - step, other.tick):
+    if not follows(first.end_tick - step, other.tick):
         return None
-    shifted = tuple(len(one.data) + index for index in other.bad_stop)
-    return msgspec.structs.replace(one, data=one.data + other.data, bad_stop=one.bad_stop + shifted)
+    shifted = tuple(len(first.data) + index for index in other.bad_stop)
+    return msgspec.structs.replace(first, data=first.data + other.data, bad_stop=first.bad_stop + shifted)

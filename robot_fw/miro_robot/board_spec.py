@@ -92,7 +92,7 @@ class BoardSpec(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_only
 
     @property
     def is_wired(self) -> bool:
-        """Whether it has nets: there is more on it than the processor and its memory, or a file describes it."""
+        """True if it has nets: there is more on it than the processor and its memory, or a file describes it."""
         return bool(
             self.of_file or self.parts or self.straps or self.latches or self.buffers or self.pull_downs
         )

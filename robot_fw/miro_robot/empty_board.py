@@ -179,7 +179,7 @@ class EmptyBoard(ProcessorBoard):
         return reason
 
     def _may_wake(self) -> bool:
-        """Whether a level on a pin may come that nobody has announced."""
+        """True if a level on a pin may come that nobody has announced."""
         return self.input_tick != NEVER_TICK
 
     def _sleep_on(self, until_cycle: int) -> None:
@@ -290,7 +290,7 @@ class EmptyBoard(ProcessorBoard):
                 registers.hold()
 
     def _watched(self) -> bool:
-        """Whether a watchdog will reset the processor."""
+        """True if a watchdog will reset the processor."""
         return self.registers is not None and self.registers.watches() != 0
 
     def _begin_again(self) -> None:

@@ -197,7 +197,7 @@ class WiredBoard(EmptyBoard):
         return (due if self.drives_rxd or due == self.output_tick else due + 2) // CYCLE_TICKS
 
     def _is_due(self, due: int, due_cycle: int) -> bool:
-        """Whether an event is to be handled before the next instruction; a MOVX moves the pins of its bus before it.
+        """True if an event is to be handled before the next instruction; a MOVX moves the pins of its bus before it.
 
         All events of the cycle in which a MOVX begins wait for it: pins are sampled once in that cycle.
         """
@@ -207,7 +207,7 @@ class WiredBoard(EmptyBoard):
         return not (waits and self.cpu.executes_next())
 
     def _is_before_write(self, due_cycle: int) -> bool:
-        """Whether the pins of `due_cycle` are sampled within the next instruction, which may write a register after.
+        """True if the pins of `due_cycle` are sampled within the next instruction, which may write a register after.
 
         What the pins do then has to be known first: a flag that they set may be cleared by that instruction.
         """
@@ -276,7 +276,7 @@ class WiredBoard(EmptyBoard):
         return 0
 
     def _goes_otherwise(self, tick: int) -> bool:
-        """Whether an output is not as it was put, or its next edge later than `tick` not where it was foreseen.
+        """True if an output is not as it was put, or its next edge later than `tick` not where it was foreseen.
 
         The serial port also works its clock out again where nothing changes, as after a timer's register is written
         with the value that it has. Parts must not be brought to that tick then: it may be beyond the end of the run.
@@ -411,10 +411,10 @@ class WiredBoard(EmptyBoard):
 
     def _note_faults(self, tick: int) -> None:
         """What parts have found on this tick: of several parts the first one's, where order and kind are the same."""
-        found = sorted(self.nets.faults, key=_order_and_kind)
+        faults = sorted(self.nets.faults, key=_order_and_kind)
         self.nets.faults = []
         before = None
-        for order, kind, detail, ago in found:
+        for order, kind, detail, ago in faults:
             if (order, kind) != before and not self.forced:
                 self._note_fault(kind, self.cpu.at, tick - ago, detail)
             before = (order, kind)

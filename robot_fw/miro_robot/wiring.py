@@ -84,8 +84,8 @@ class Wiring(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
         latch, dot, bit = name.partition(".")
         place = f"parts.{side}.pins.{pin}"
         if not dot or bit not in tuple("01234567"):
-            what = f"{source!r} drives no LM629 of the fast board"
-            raise WiringError("", place, what, "name a port pin, a bit of a latch, 0 or 1")
+            problem = f"{source!r} drives no LM629 of the fast board"
+            raise WiringError("", place, problem, "name a port pin, a bit of a latch, 0 or 1")
         return self._latch_bank(latch, place), int(bit), inverted
 
     def cpu_inputs(self) -> list[tuple[int, int, str, int]]:
@@ -95,8 +95,8 @@ class Wiring(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
             if match := _PORT_PIN.match(net):
                 inputs.append((int(match[1]), int(match[2]), source.lstrip("!"), int(source.startswith("!"))))
                 if f"P{match[1]}" == self.data:
-                    what = f"{net} is a pin of the data bus, nothing else can drive it"
-                    raise WiringError("", "parts.left.pins.d0", what, "wire the other to another port")
+                    problem = f"{net} is a pin of the data bus, nothing else can drive it"
+                    raise WiringError("", "parts.left.pins.d0", problem, "wire the other to another port")
         return inputs
 
     def _latch_bank(self, name: str, place: str) -> int:
@@ -153,8 +153,8 @@ def _wiring(text: str, origin: str) -> Wiring:
         check_no_wiring(table)
         board = struct_of(table, _BoardFile)
         if board.crystal_hz != 24_000_000:
-            what = "the fast board has 24000000 only, time is counted in its ticks"
-            raise WiringError("", "crystal_hz", what, "run it as a board of parts")
+            problem = "the fast board has 24000000 only, time is counted in its ticks"
+            raise WiringError("", "crystal_hz", problem, "run it as a board of parts")
         for key, there, most in (
             ("latches", board.latches, MAX_LATCHES),
             ("buffers", board.buffers, MAX_BUFFERS),
@@ -188,11 +188,11 @@ def _point_to_point(board: _BoardFile) -> Wiring:
         buses.append([pins.get(f"d{bit}", ("",))[0] for bit in range(8)])
     data = buses[0][0].partition(".")[0]
     if any(bus != [f"{data}.{bit}" for bit in range(8)] for bus in buses):
-        what, remedy = (
+        problem, remedy = (
             "the fast board has one data bus",
             "wire d0 to d7 of both to one port or latch, in order",
         )
-        raise WiringError("", "parts.left.pins", what, remedy)
+        raise WiringError("", "parts.left.pins", problem, remedy)
     for name, strap in board.straps.items():
         for pin in _in_ports(strap.pin, ports):
             _drive(nets, pin, _STRAPS.get(name, str(strap.level)), f"straps.{name}.pin")
@@ -216,8 +216,8 @@ def _in_ports(word: str, ports: dict[str, tuple[str, ...]]) -> tuple[str, ...]:
 def _drive(nets: dict[str, str], pin: str, source: str, place: str) -> None:
     """Something drives a port pin of the CPU. Raises WiringError if it is none, or driven already."""
     if not _PORT_PIN.match(pin):
-        what = f"{pin!r} is no port pin, and the fast board knows nothing else there"
-        raise WiringError("", place, what, "name a port pin, as P3.2")
+        problem = f"{pin!r} is no port pin, and the fast board knows nothing else there"
+        raise WiringError("", place, problem, "name a port pin, as P3.2")
     if pin in nets:
         raise WiringError("", place, f"{pin} is driven by {nets[pin]}, too", "use another pin")
     nets[pin] = source
@@ -227,5 +227,5 @@ def check_no_wiring(table: dict[str, Any]) -> None:
     """Refuses an old wiring file. Raises WiringError."""
     for key in ("data", "latch", "buffer"):
         if key in table:
-            what = "this is an old wiring file, not a board file"
-            raise WiringError("", key, what, "write its parts as `mirotwin boards show miro` does")
+            problem = "this is an old wiring file, not a board file"
+            raise WiringError("", key, problem, "write its parts as `mirotwin boards show miro` does")

@@ -19,7 +19,7 @@ class Ranged(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_only=Tr
 
     def __init_subclass__(cls) -> None:
         metadata = {name: getattr(kind, "__metadata__", ()) for name, kind in cls.__annotations__.items()}
-        cls.WITHIN = cls.WITHIN | {name: found[0] for name, found in metadata.items() if found}
+        cls.WITHIN = cls.WITHIN | {name: metas[0] for name, metas in metadata.items() if metas}
 
     def __post_init__(self) -> None:
         for name, (low, high) in self.WITHIN.items():

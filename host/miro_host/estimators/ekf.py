@@ -128,17 +128,17 @@ class Ekf(Estimator[EkfParameters]):
             )
 
     def step(self, given: EstimatorInput) -> Estimate | None:
-        one = self.filter
+        ekf = self.filter
         effect_s = given.t_s + self.parameters.delay_s(given)
-        one.command(given.left_m_s, given.right_m_s, effect_s, given.period_s)
+        ekf.command(given.left_m_s, given.right_m_s, effect_s, given.period_s)
         self._measure(given)
-        if not one.known:
+        if not ekf.known:
             return None
         oldest_s = effect_s - (KEPT - 1) * given.period_s
-        if one.at_s < oldest_s:
-            one.predict(oldest_s)
-        one.run(effect_s)
-        motion, state = one.motion, one.state
+        if ekf.at_s < oldest_s:
+            ekf.predict(oldest_s)
+        ekf.run(effect_s)
+        motion, state = ekf.motion, ekf.state
         posture = Posture(motion.x_m, motion.y_m, motion.theta_rad)
         return Estimate(effect_s, posture, state[3], state[4], self._named(posture, state))
 
@@ -159,8 +159,8 @@ class Ekf(Estimator[EkfParameters]):
 
     def _see(self, measured: Posture, now_s: float) -> None:
         """Prediction to the exposure, then update, refusal or a new beginning."""
-        one, exposed_s = self.filter, self._exposed_s(measured, now_s)
-        if exposed_s > now_s or (one.known and exposed_s <= one.at_s):
+        ekf, exposed_s = self.filter, self._exposed_s(measured, now_s)
+        if exposed_s > now_s or (ekf.known and exposed_s <= ekf.at_s):
             return
         position_m, heading_rad = self.parameters.noise(measured)
         if isinstance(measured, Sighting):
@@ -168,16 +168,16 @@ class Ekf(Estimator[EkfParameters]):
             position_m, heading_rad = position_m / confidence, heading_rad / confidence
         seen = measured.x_m, measured.y_m, measured.theta_rad
         noise = position_m * position_m, heading_rad * heading_rad
-        if one.known:
-            one.predict(exposed_s)
+        if ekf.known:
+            ekf.predict(exposed_s)
             if self._believed(measured, noise):
-                one.see(*seen, *noise)
+                ekf.see(*seen, *noise)
                 self.refused = 0
                 return
             self.refused += 1
             if self.refused < REFUSED:
                 return
-        one.start(*seen, exposed_s, *noise)
+        ekf.start(*seen, exposed_s, *noise)
         self._begin()
 
     def _begin(self) -> None:
@@ -185,6 +185,6 @@ class Ekf(Estimator[EkfParameters]):
         self.refused = 0
 
     def _believed(self, measured: Posture, noise: tuple[float, float]) -> bool:
-        """Whether a measurement is near enough to the prediction."""
+        """True if a measurement is near enough to the prediction."""
         distance2 = self.filter.distance2(measured.x_m, measured.y_m, measured.theta_rad, *noise)
         return distance2 <= self.parameters.gate * self.parameters.gate

@@ -119,17 +119,17 @@ class EkfTelemetry(Ekf):
 
     def _count(self, telemetry: LastTelemetry, read_s: float) -> None:
         """Prediction to the instant of the counts, then correction by them, or the beginning of counting."""
-        one = self.filter
-        if not one.known or read_s <= one.at_s:
+        ekf = self.filter
+        if not ekf.known or read_s <= ekf.at_s:
             return
-        one.predict(read_s)
-        left_m = self._beyond_m(telemetry.position_left - self.left_count, one.left_m)
-        right_m = self._beyond_m(telemetry.position_right - self.right_count, one.right_m)
+        ekf.predict(read_s)
+        left_m = self._beyond_m(telemetry.position_left - self.left_count, ekf.left_m)
+        right_m = self._beyond_m(telemetry.position_right - self.right_count, ekf.right_m)
         self.left_count, self.right_count = telemetry.position_left, telemetry.position_right
         gate = self.parameters.count_gate if self.counting else 0.0
         noise_m2 = self.parameters.count_noise_m * self.parameters.count_noise_m
-        one.count(5, left_m, noise_m2, gate)
-        one.count(6, right_m, noise_m2, gate)
+        ekf.count(5, left_m, noise_m2, gate)
+        ekf.count(6, right_m, noise_m2, gate)
         self.counting = True
 
     @staticmethod
@@ -147,19 +147,19 @@ class EkfTelemetry(Ekf):
 
     def _believed(self, measured: Posture, noise: tuple[float, float]) -> bool:
         """Where the camera surprises again and again, the posture is loosened: the wheels are not blamed."""
-        one, state = self.filter, self.filter.state
+        ekf, state = self.filter, self.filter.state
         sin, cos = sincos(state[2])
         x_m, y_m = measured.x_m - state[0] - state[7], measured.y_m - state[1] - state[8]
         ahead_m = x_m * cos + y_m * sin
         spread_m = math.sqrt(
-            one.along_m2(cos, sin, noise[0]) + self.parameters.warp_m * self.parameters.warp_m
+            ekf.along_m2(cos, sin, noise[0]) + self.parameters.warp_m * self.parameters.warp_m
         )
         self.surprise = KEPT * self.surprise + (1.0 - KEPT) * ahead_m / spread_m
         slip_m_s = 0.0
         if abs(self.surprise) > SURPRISE:
-            slip_m_s = -ahead_m / (one.at_s - self.seen_s)
+            slip_m_s = -ahead_m / (ekf.at_s - self.seen_s)
             turn_rad = ahead_m / WHEELS.track_m  # of which one wheel may slip more than the other
-            one.loosen(ahead_m * ahead_m, turn_rad * turn_rad)
+            ekf.loosen(ahead_m * ahead_m, turn_rad * turn_rad)
         self.slip_m_s = KEPT * self.slip_m_s + (1.0 - KEPT) * slip_m_s
-        self.seen_s = one.at_s
+        self.seen_s = ekf.at_s
         return super()._believed(measured, noise)

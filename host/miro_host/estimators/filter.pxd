@@ -35,5 +35,5 @@ cdef class Filter:
     cpdef see(self, double x_m, double y_m, double theta_rad, double position_m2, double heading_rad2)
     @cython.locals(believed=cython.bint)
     cpdef bint count(self, int extra, double extra_m, double variance, double gate)
-    cdef int correct(self, int one, int other, double innovation, double variance) except -1
+    cdef int correct(self, int first, int other, double innovation, double variance) except -1
     cdef int tidy(self) except -1

@@ -117,7 +117,7 @@ class Filter:
                     raise ValueError("the covariance is not positive definite")
 
     def finite(self) -> bool:
-        """Whether every number is one."""
+        """True if every number is one."""
         total = self.at_s
         for index in range(_N):
             total += abs(self.state[index])
@@ -301,16 +301,16 @@ class Filter:
             self.right_m = 0.0
         return believed
 
-    def correct(self, one: int, other: int, innovation: float, variance: float) -> None:
+    def correct(self, first: int, other: int, innovation: float, variance: float) -> None:
         """Takes one number that measures a state, or the sum of two."""
         p = self.covariance
         column = self.column
         n = self.size
         for i in range(n):
-            column[i] = p[i * _N + one]
+            column[i] = p[i * _N + first]
             if other >= 0:
                 column[i] += p[i * _N + other]
-        whole = column[one] + variance
+        whole = column[first] + variance
         if other >= 0:
             whole += column[other]
         for i in range(n):

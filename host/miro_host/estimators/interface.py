@@ -58,13 +58,13 @@ class Estimate(msgspec.Struct, frozen=True, gc=False):
 @cache
 def _ranges(parameters: type[msgspec.Struct]) -> dict[str, tuple[float, float]]:
     """The least and the most of each parameter whose annotation says both."""
-    found = {}
+    ranges = {}
     for field in msgspec.structs.fields(parameters):
         for kind in (field.type, *get_args(field.type)):
             for meta in getattr(kind, "__metadata__", ()):
                 if isinstance(meta, Meta) and meta.ge is not None and meta.le is not None:
-                    found[field.name] = meta.ge, meta.le
-    return found
+                    ranges[field.name] = meta.ge, meta.le
+    return ranges
 
 
 class EstimatorParameters(

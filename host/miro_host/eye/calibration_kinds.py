@@ -133,12 +133,12 @@ def worst_error_m(true: CameraParameters, calibration: Calibration) -> float:
 def _grid(true: CameraParameters) -> list[tuple[float, float, float, float]]:
     """x, y, u, v: points of the pitch, and where the true camera draws them."""
     lens = Lens(true)
-    found = []
+    points = []
     for column in range(round((RIGHT_M - LEFT_M) / GRID_M) + 1):
         for row in range(round((TOP_M - BOTTOM_M) / GRID_M) + 1):
             x_m, y_m = LEFT_M + column * GRID_M, BOTTOM_M + row * GRID_M
-            found.append((x_m, y_m, *lens.pixel(x_m, y_m, ROBOT_HEIGHT_M)))
-    return found
+            points.append((x_m, y_m, *lens.pixel(x_m, y_m, ROBOT_HEIGHT_M)))
+    return points
 
 
 def _worst_m(grid: list[tuple[float, float, float, float]], calibration: Calibration) -> float:

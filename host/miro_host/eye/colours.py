@@ -51,14 +51,14 @@ def read_samples(path: str | Path) -> Samples:
 
 def parse_samples(text: str, origin: str) -> Samples:
     """Colour samples from CSV text. Raises EyeError with the line for wrong columns and for what is no level."""
-    found: Samples = {}
+    samples: Samples = {}
     for line, cells in csv_rows(text, origin, RGB, YCC):
         name = cells.pop("colour").strip()
         columns = RGB if "r" in cells else YCC
-        one, two, three = (_level(cells[column], origin, line) for column in columns[1:])
-        pixel = _of_rgb(one, two, three) if columns is RGB else (one, two, three)
-        found.setdefault(name, []).append(pixel)
-    return found
+        first, second, third = (_level(cells[column], origin, line) for column in columns[1:])
+        pixel = _of_rgb(first, second, third) if columns is RGB else (first, second, third)
+        samples.setdefault(name, []).append(pixel)
+    return samples
 
 
 def _level(cell: str, origin: str, line: int) -> int:
@@ -120,14 +120,14 @@ class ColourClasses(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_
     def table(self) -> bytes:
         """Class by Y >> 4, Cb >> 2, Cr >> 2, as `Regions` takes it: decided in the middle of each cell."""
         cells = self._by_chroma()
-        found = bytearray()
+        table = bytearray()
         for luma in range(16):
             numbers = bytearray(range(256))  # of a class, and what a pixel of this luma is then
             for name, mean in self.colours.items():
                 if 16.0 * luma + 8.0 < self.least_luma * mean.y:
                     numbers[CLASS_OF[name]] = 0
-            found += cells.translate(numbers)
-        return bytes(found)
+            table += cells.translate(numbers)
+        return bytes(table)
 
     def _by_chroma(self) -> bytearray:
         """Class by Cb >> 2, Cr >> 2 of what is light enough: that of the nearest hue, 0 for too little of it."""
@@ -155,8 +155,8 @@ def classes_of(
     means = {}
     for name, pixels in samples.items():
         if len(pixels) < 4:
-            what = f"{len(pixels)} sampled pixels"
-            raise EyeError(origin, f"colours.{name}", what, "sample at least 4, better a whole patch")
+            sampled = f"{len(pixels)} sampled pixels"
+            raise EyeError(origin, f"colours.{name}", sampled, "sample at least 4, better a whole patch")
         means[name] = _mean(pixels)
     floor = means.pop(FLOOR, None)
     problem = _problem(means, floor)
@@ -197,18 +197,18 @@ def _problem(means: Mapping[str, ColourMean], floor: ColourMean | None) -> tuple
             return place, "the floor has nearly the same colour", "use another paint, or a duller floor"
         for other in names[:index]:
             if _overlap(mean, means[other]):
-                what = f"cannot be told from {other}: hues too near for the noise in the samples"
-                return place, what, "use another paint, more light, or sample inside the patches"
+                problem = f"cannot be told from {other}: hues too near for the noise in the samples"
+                return place, problem, "use another paint, more light, or sample inside the patches"
     return None
 
 
-def _overlap(one: ColourMean, other: ColourMean) -> bool:
-    """Whether noise takes samples of one across the line of equal hue distance, the bisector of both directions."""
-    first, second = _length(one), _length(other)
-    dx = (one.cb - 128.0) / first - (other.cb - 128.0) / second
-    dy = (one.cr - 128.0) / first - (other.cr - 128.0) / second
+def _overlap(mean: ColourMean, other: ColourMean) -> bool:
+    """True if noise takes samples of one across the line of equal hue distance, the bisector of both directions."""
+    first, second = _length(mean), _length(other)
+    dx = (mean.cb - 128.0) / first - (other.cb - 128.0) / second
+    dy = (mean.cr - 128.0) / first - (other.cr - 128.0) / second
     sine = 0.5 * math.sqrt(dx * dx + dy * dy)  # of half the angle between the hues
-    spread = max(one.spread, other.spread, 1.0)
+    spread = max(mean.spread, other.spread, 1.0)
     return sine * min(first, second) < SIGMAS * spread / math.sqrt(2.0)
 
 

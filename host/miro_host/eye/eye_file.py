@@ -32,8 +32,8 @@ def text_of(path: str | Path) -> str:
         try:
             return read_input(path, EYE_BYTES).decode("utf-8-sig")
         except OSError as error:
-            what = f"cannot be read: {error.strerror}"
-            raise EyeError(path, "", what, "check path and permissions") from None
+            problem = f"cannot be read: {error.strerror}"
+            raise EyeError(path, "", problem, "check path and permissions") from None
         except UnicodeDecodeError:
             raise EyeError(path, "", "not UTF-8 text", "give a text file") from None
 

@@ -96,12 +96,12 @@ def fit(
 
     first = [getattr(start, name) / scale for name, scale in zip(free, scales, strict=True)]
     try:
-        found = _checked(_changed(start, free, minimised(residuals, first), scales), origin)
+        fitted = _checked(_changed(start, free, minimised(residuals, first), scales), origin)
     except NoConvergenceError as error:
         raise EyeError(
             origin, "", f"no convergence: {error}", "begin nearer to the truth, check the points"
         ) from None
-    return _calibration(points, found, free, origin)
+    return _calibration(points, fitted, free, origin)
 
 
 def _check_points(
@@ -112,8 +112,8 @@ def _check_points(
         raise EyeError(origin, "", f"{len(points)} points", f"give at most {MOST_POINTS}")
     places = len({(point.x_m, point.y_m, point.z_m) for point in points})
     if places < least:
-        what = f"{places} points for {len(free)} parameters"
-        raise EyeError(origin, "", what, f"give at least {least}, better 20 all over the pitch")
+        problem = f"{places} points for {len(free)} parameters"
+        raise EyeError(origin, "", problem, f"give at least {least}, better 20 all over the pitch")
     if _across_m(points) < LINE_M:
         raise EyeError(origin, "", "the points lie on one line", "add points beside it, all over the pitch")
     lens = Lens(start)
@@ -151,12 +151,12 @@ def _changed(
 def _residuals(points: Sequence[ControlPoint], parameters: CameraParameters) -> list[float]:
     """Drawn minus measured, u and v of each point in px. Raises ValueError for a point behind the camera."""
     lens = Lens(parameters)
-    found = []
+    residuals = []
     for point in points:
         u, v = lens.pixel(point.x_m, point.y_m, point.z_m)
-        found.append(u - point.u)
-        found.append(v - point.v)
-    return found
+        residuals.append(u - point.u)
+        residuals.append(v - point.v)
+    return residuals
 
 
 def _checked(parameters: CameraParameters, origin: str) -> CameraParameters:
@@ -164,14 +164,14 @@ def _checked(parameters: CameraParameters, origin: str) -> CameraParameters:
     try:
         return msgspec.convert(msgspec.to_builtins(parameters), CameraParameters)
     except msgspec.ValidationError as error:
-        what = f"no convergence: the result is out of range ({error})".replace("`", "")
-        raise EyeError(origin, "", what, "begin nearer to the truth, check the points") from None
+        problem = f"no convergence: the result is out of range ({error})".replace("`", "")
+        raise EyeError(origin, "", problem, "begin nearer to the truth, check the points") from None
 
 
 def _calibration(
-    points: Sequence[ControlPoint], found: CameraParameters, free: tuple[str, ...], origin: str
+    points: Sequence[ControlPoint], fitted: CameraParameters, free: tuple[str, ...], origin: str
 ) -> Calibration:
-    off = _residuals(points, found)
+    off = _residuals(points, fitted)
     squares = 0.0
     px = []
     for index in range(0, len(off), 2):
@@ -181,7 +181,7 @@ def _calibration(
     rms = math.sqrt(squares / len(px))
     if rms > WORST_RMS_PX:
         worst = px.index(max(px)) + 1
-        what = f"no convergence: {rms:.1f} px rms remain, most at point {worst}"
-        raise EyeError(origin, "", what, "check the columns, the units and the start")
+        problem = f"no convergence: {rms:.1f} px rms remain, most at point {worst}"
+        raise EyeError(origin, "", problem, "check the columns, the units and the start")
     residuals = Residuals(rms_px=rms, max_px=max(px), points=len(px), px=tuple(px))
-    return Calibration(camera=found, free=free, residuals=residuals)
+    return Calibration(camera=fitted, free=free, residuals=residuals)

@@ -59,7 +59,7 @@ def minimised(residuals: Residuals, first: Sequence[float]) -> list[float]:
 def _step(residuals: Residuals, values: list[float], off: list[float], damping: float) -> list[float]:
     """Solves (J'J + damping diag(J'J)) step = -J'r."""
     columns = [_derivative(residuals, values, index) for index in range(len(values))]
-    matrix = [[product(one, other) for other in columns] for one in columns]
+    matrix = [[product(column, other) for other in columns] for column in columns]
     for index, row in enumerate(matrix):
         row[index] += damping * row[index] + 1e-12
     return solved(matrix, [0.0 - product(column, off) for column in columns])
@@ -74,7 +74,7 @@ def _derivative(residuals: Residuals, values: list[float], index: int) -> list[f
         above, below = residuals(up), residuals(down)
     except ValueError as error:
         raise NoConvergenceError(f"{error}") from None
-    return [(one - other) / (2.0 * _DIFFERENCE) for one, other in zip(above, below, strict=True)]
+    return [(upper - other) / (2.0 * _DIFFERENCE) for upper, other in zip(above, below, strict=True)]
 
 
 def solved(matrix: list[list[float]], right: list[float]) -> list[float]:
@@ -99,10 +99,10 @@ def solved(matrix: list[list[float]], right: list[float]) -> list[float]:
     return x
 
 
-def product(one: Sequence[float], other: Sequence[float]) -> float:
+def product(first: Sequence[float], other: Sequence[float]) -> float:
     """The scalar product, added in this order."""
     total = 0.0
-    for left, right in zip(one, other, strict=True):
+    for left, right in zip(first, other, strict=True):
         total += left * right
     return total
 

@@ -27,7 +27,7 @@ cdef class Patches:
     cpdef expect(self, double team_x, double team_y, double identity_x, double identity_y)
     cpdef int choose(self, int team, int identity) except -1
     cdef bint is_whole(self, int patch, int kind) noexcept
-    cdef bint fits(self, int one, int other) noexcept
-    cdef void take(self, int one, int other) noexcept
+    cdef bint fits(self, int mark, int other) noexcept
+    cdef void take(self, int mark, int other) noexcept
     cdef double off_m(self, int team, int identity) noexcept
     cdef int partners(self, int patch) noexcept

@@ -72,7 +72,7 @@ class Patches:
         self.count += 1
 
     def is_patch(self, region: int) -> bool:
-        """Whether a region has the size of a patch; half of it is enough for one that is cut off."""
+        """True if a region has the size of a patch; half of it is enough for one that is cut off."""
         area = self.regions.area[region]
         if self.regions.touches[region]:
             area += area
@@ -97,40 +97,40 @@ class Patches:
         """The pair of these two classes that is nearest to what is expected; returns the number of pairs."""
         self.out_pairs = 0
         self.out_off_m = self.out_next_m = _FAR
-        for one in range(self.count):
-            if self.is_whole(one, team):
+        for mark in range(self.count):
+            if self.is_whole(mark, team):
                 for other in range(self.count):
-                    if self.is_whole(other, identity) and self.fits(one, other):
-                        self.take(one, other)
+                    if self.is_whole(other, identity) and self.fits(mark, other):
+                        self.take(mark, other)
         return self.out_pairs
 
     def is_whole(self, patch: int, kind: int) -> bool:
-        """Whether a patch is of this class and complete."""
+        """True if a patch is of this class and complete."""
         region = self.index[patch]
         return self.regions.kind[region] == kind and not self.regions.touches[region]
 
-    def fits(self, one: int, other: int) -> bool:
-        """Whether two patches are as far from each other as those of a robot."""
-        dx = self.x_m[one] - self.x_m[other]
-        dy = self.y_m[one] - self.y_m[other]
+    def fits(self, mark: int, other: int) -> bool:
+        """True if two patches are as far from each other as those of a robot."""
+        dx = self.x_m[mark] - self.x_m[other]
+        dy = self.y_m[mark] - self.y_m[other]
         least_m, most_m = self.robot_top.least_m, self.robot_top.most_m
         return least_m * least_m <= dx * dx + dy * dy <= most_m * most_m
 
-    def take(self, one: int, other: int) -> None:
+    def take(self, mark: int, other: int) -> None:
         """A pair was found: it is the nearest so far, or it may be the second."""
         self.out_pairs += 1
-        off = self.off_m(one, other)
+        off = self.off_m(mark, other)
         if off >= self.out_off_m:
             self.out_next_m = min(self.out_next_m, off)
             return
         self.out_next_m = self.out_off_m
         self.out_off_m = off
-        self.out_team = self.index[one]
+        self.out_team = self.index[mark]
         self.out_identity = self.index[other]
-        dx = self.x_m[one] - self.x_m[other]
-        dy = self.y_m[one] - self.y_m[other]
+        dx = self.x_m[mark] - self.x_m[other]
+        dy = self.y_m[mark] - self.y_m[other]
         self.out_gap_m = math.sqrt(dx * dx + dy * dy)
-        self.out_contested = self.partners(one) > 1 or self.partners(other) > 1
+        self.out_contested = self.partners(mark) > 1 or self.partners(other) > 1
 
     def off_m(self, team: int, identity: int) -> float:
         """Distance of a pair from what is expected; 0 if nothing is."""
@@ -150,8 +150,8 @@ class Patches:
     def partners(self, patch: int) -> int:
         """Number of patches that this one could make a robot with, of any team and identity."""
         of_team = self.regions.kind[self.index[patch]] <= _TEAMS
-        found = 0
+        count = 0
         for other in range(self.count):
             if (self.regions.kind[self.index[other]] <= _TEAMS) != of_team and self.fits(patch, other):
-                found += 1
-        return found
+                count += 1
+        return count

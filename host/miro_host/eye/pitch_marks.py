@@ -46,22 +46,22 @@ _AREA_SIDE_M = (0.05, 0.10)
 
 
 def _all() -> tuple[PitchMark, ...]:
-    found = []
+    marks = []
     for y in (BOTTOM_M, TOP_M):
-        found += [PitchMark(x, y, 1.0, 0.0, WALL_M) for x in _ALONG_WALL_M]
+        marks += [PitchMark(x, y, 1.0, 0.0, WALL_M) for x in _ALONG_WALL_M]
     for sign in (-1.0, 1.0):
         end_m = LEFT_M if sign < 0.0 else RIGHT_M
         area_m = end_m - sign * AREA_DEPTH_M
         for up in (-1.0, 1.0):
-            found += [PitchMark(end_m, MIDDLE_Y_M + up * y, 0.0, 1.0, WALL_M) for y in _ASIDE_WALL_M]
-            found += [PitchMark(end_m, MIDDLE_Y_M + up * y, 0.0, 1.0) for y in _GOAL_LINE_M]
-            found += [PitchMark(area_m, MIDDLE_Y_M + up * y, 0.0, 1.0) for y in _AREA_LINE_M]
-            found += [
+            marks += [PitchMark(end_m, MIDDLE_Y_M + up * y, 0.0, 1.0, WALL_M) for y in _ASIDE_WALL_M]
+            marks += [PitchMark(end_m, MIDDLE_Y_M + up * y, 0.0, 1.0) for y in _GOAL_LINE_M]
+            marks += [PitchMark(area_m, MIDDLE_Y_M + up * y, 0.0, 1.0) for y in _AREA_LINE_M]
+            marks += [
                 PitchMark(end_m - sign * x, MIDDLE_Y_M + up * AREA_HALF_M, 1.0, 0.0) for x in _AREA_SIDE_M
             ]
     for up in (-1.0, 1.0):
-        found += [PitchMark(MIDDLE_X_M, MIDDLE_Y_M + up * y, 0.0, 1.0) for y in _MIDDLE_LINE_M]
-    return tuple(found)
+        marks += [PitchMark(MIDDLE_X_M, MIDDLE_Y_M + up * y, 0.0, 1.0) for y in _MIDDLE_LINE_M]
+    return tuple(marks)
 
 
 MARKS = _all()

@@ -30,7 +30,7 @@ cdef class Regions:
                    runs='long long', column='long long', before=int, kind=int)
     cdef void find_runs(self, bytearray pixels) noexcept
     cdef void merge(self) noexcept
-    cdef void join(self, int one, int other) noexcept
+    cdef void join(self, int first, int other) noexcept
     cdef int root(self, int run) noexcept
     cdef void collect(self) noexcept
     cdef void add(self, int index, int run) noexcept

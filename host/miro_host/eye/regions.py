@@ -139,10 +139,10 @@ class Regions:
                     self.join(other, run)
                 other += 1
 
-    def join(self, one: int, other: int) -> None:
+    def join(self, first: int, other: int) -> None:
         """Makes one tree of both; its root is the earliest run."""
-        one, other = self.root(one), self.root(other)
-        self.parent[max(one, other)] = min(one, other)
+        first, other = self.root(first), self.root(other)
+        self.parent[max(first, other)] = min(first, other)
 
     def root(self, run: int) -> int:
         """The root of a run's tree; halves the way to it (Tarjan and van Leeuwen 1984)."""

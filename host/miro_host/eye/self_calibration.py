@@ -150,15 +150,15 @@ def changed(camera: CameraParameters, changes: Sequence[float]) -> CameraParamet
 def slopes_of(camera: CameraParameters, mark: PitchMark) -> tuple[float, ...]:
     """By how much the mark moves across its band with each of `LEARNT`, in pixels."""
     here = expected(Lens(camera), mark)
-    found = []
+    slopes = []
     for index, spread in enumerate(SPREADS):
         step = 0.01 * spread
         changes = [0.0] * _SIZE
         changes[index] = step
         moved = expected(Lens(changed(camera, changes)), mark)
         across = (moved.u - here.u) * here.across_u + (moved.v - here.v) * here.across_v
-        found.append(across / step)
-    return tuple(found)
+        slopes.append(across / step)
+    return tuple(slopes)
 
 
 def _hides(robot: Track, mark: PitchMark) -> bool:

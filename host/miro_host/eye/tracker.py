@@ -203,7 +203,7 @@ class Tracker:
     def _search(self, frame: Pixels, tick: int, pairs: list[Pair | None]) -> None:
         """Looks for the robots that are None in `pairs` in the whole picture, and puts in what it finds once."""
         missing = [slot for slot, pair in enumerate(pairs) if pair is None]
-        found: dict[int, list[Pair]] = {slot: [] for slot in missing}
+        pairs_at: dict[int, list[Pair]] = {slot: [] for slot in missing}
         for u, v in candidates(frame, self.regions, self.team_kind, self.top.side_px):
             pixels = self._look(frame, u, v, SEARCH_PX, -1)
             for slot in missing:
@@ -212,11 +212,11 @@ class Tracker:
                 if track.seen:
                     self._expect(track.x_m, track.y_m, track.theta_rad)
                 pair = self._chosen(pixels, tick, slot)
-                if pair is not None and not any(_same_patch(pair, other) for other in found[slot]):
-                    found[slot].append(pair)
+                if pair is not None and not any(_same_patch(pair, other) for other in pairs_at[slot]):
+                    pairs_at[slot].append(pair)
         for slot in missing:
-            if len(found[slot]) == 1:
-                pairs[slot] = found[slot][0]
+            if len(pairs_at[slot]) == 1:
+                pairs[slot] = pairs_at[slot][0]
 
     # ---- which pair it is
 
@@ -285,8 +285,8 @@ def _first(middle: float, size: int, whole: int) -> int:
     return int(max(0, min(math.floor(middle) - size // 2, whole - size)))
 
 
-def _same_patch(one: Pair, other: Pair) -> bool:
-    return abs(one.u - other.u) < 2.0 and abs(one.v - other.v) < 2.0
+def _same_patch(first: Pair, other: Pair) -> bool:
+    return abs(first.u - other.u) < 2.0 and abs(first.v - other.v) < 2.0
 
 
 def _check(team: str, robots: Sequence[int], pattern: str, centroid: str, window_px: int) -> None:
@@ -309,20 +309,20 @@ ROW_STEP = 4
 
 def candidates(frame: Pixels, regions: Regions, team: int, side_px: float) -> list[tuple[int, int]]:
     """(u, v) of what may be patches of class `team`, whose sides are `side_px` long; rows from the top."""
-    found: list[tuple[float, int, int]] = []  # middle of the first run, first row, last row
+    squares: list[tuple[float, int, int]] = []  # middle of the first run, first row, last row
     for row in range(ROW_STEP // 2, frame.height, ROW_STEP):
         count = regions.find(frame.window(0, row, frame.width, 1), frame.width, 1)
         for index in range(count):
             run = regions.region(index)
             if run.kind == team and 0.4 * side_px <= run.area <= 1.5 * side_px + 4.0:
-                _add(found, 0.5 * (run.left + run.right), row, side_px)
-    return [(int(u), (first + last) // 2) for u, first, last in found]
+                _add(squares, 0.5 * (run.left + run.right), row, side_px)
+    return [(int(u), (first + last) // 2) for u, first, last in squares]
 
 
-def _add(found: list[tuple[float, int, int]], u: float, row: int, side_px: float) -> None:
+def _add(squares: list[tuple[float, int, int]], u: float, row: int, side_px: float) -> None:
     """A run goes on with what was found in the last rows, or it is something new."""
-    for place, (first_u, first, last) in enumerate(found):
+    for place, (first_u, first, last) in enumerate(squares):
         if row - last <= ROW_STEP and row - first <= 2.0 * side_px and abs(u - first_u) <= side_px:
-            found[place] = (first_u, first, row)
+            squares[place] = (first_u, first, row)
             return
-    found.append((u, row, row))
+    squares.append((u, row, row))

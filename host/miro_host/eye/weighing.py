@@ -122,7 +122,7 @@ class Weighing:
         self.out_v[which] = total_v
 
     def nearest(self, u: int, v: int, own: int) -> bool:
-        """Whether no rival is nearer to a point in 1/16 px than `own`, a square of a distance."""
+        """True if no rival is nearer to a point in 1/16 px than `own`, a square of a distance."""
         for rival in range(self.rivals):
             along = u - self.rival_u[rival]
             down = v - self.rival_v[rival]

@@ -100,20 +100,23 @@ class CheckedReference:
     def at(self, t_s: float) -> Reference:
         """The reference at `t_s`. Raises PluginError."""
         try:
-            found = self.trajectory.at(t_s)
-            if not isinstance(found, Reference):
-                raise ValueError(f"`at` returned {found!r:.40}, which is no Reference")
-            if not isinstance(found.posture, Posture):
-                raise ValueError(f"its posture is {found.posture!r:.60}, which is no Posture")
-            for value in (*msgspec.structs.astuple(found.posture), *msgspec.structs.astuple(found)[1:]):
+            reference = self.trajectory.at(t_s)
+            if not isinstance(reference, Reference):
+                raise ValueError(f"`at` returned {reference!r:.40}, which is no Reference")
+            if not isinstance(reference.posture, Posture):
+                raise ValueError(f"its posture is {reference.posture!r:.60}, which is no Posture")
+            for value in (
+                *msgspec.structs.astuple(reference.posture),
+                *msgspec.structs.astuple(reference)[1:],
+            ):
                 if type(value) is not float or not math.isfinite(value):
-                    raise ValueError(f"it returned {found!r}; all must be finite floats")
+                    raise ValueError(f"it returned {reference!r}; all must be finite floats")
         except (Exception, SystemExit) as error:
             reason = str(error) if type(error) is ValueError else described(error)
             place = raised_at(error) or defined_at(getattr(self.trajectory, "at", None))
-            what = f"reference {self.name!r} failed at {t_s:.6f} s: {at_place(reason, place)}"
-            raise PluginError(what, "mend the reference or its parameters") from error
-        return found
+            problem = f"reference {self.name!r} failed at {t_s:.6f} s: {at_place(reason, place)}"
+            raise PluginError(problem, "mend the reference or its parameters") from error
+        return reference
 
 
 ORIGIN_M = 1e-8

@@ -101,7 +101,9 @@ class Timed:
         """
         end_s = self.times_s[-1]
         looks = (
-            self.at(one.begin_s + one.length_s * k / LOOKS) for one in self.pieces for k in range(LOOKS + 1)
+            self.at(piece.begin_s + piece.length_s * k / LOOKS)
+            for piece in self.pieces
+            for k in range(LOOKS + 1)
         )
         step_s = end_s or 1.0
         for look in looks:
@@ -118,13 +120,13 @@ def _rests(points: Sequence[Point]) -> list[bool]:
 
 def _headings(points: Sequence[Point]) -> list[float]:
     """Of each piece, the direction from its first point to its last; of one that stands, that of the one before."""
-    found: list[float | None] = [
+    known: list[float | None] = [
         None if rests else atan2(b[2] - a[2], b[1] - a[1])
         for (a, b), rests in zip(pairwise(points), _rests(points), strict=True)
     ]
-    last = next((heading for heading in found if heading is not None), 0.0)
+    last = next((heading for heading in known if heading is not None), 0.0)
     headings = []
-    for heading in found:
+    for heading in known:
         last = last if heading is None else heading
         headings.append(last)
     return headings

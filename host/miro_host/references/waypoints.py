@@ -225,18 +225,18 @@ def headings(
     `closed`: the last point is followed by the first. ValueError where the path turns back on itself.
     """
     count = len(points)
-    found: list[float | None] = list(given)
+    filled: list[float | None] = list(given)
     inner = range(count) if closed else range(1, count - 1)
     for i in inner:
-        if found[i] is None:
-            found[i] = _on_circle(points[i - 1], points[i], points[(i + 1) % count], i)
+        if filled[i] is None:
+            filled[i] = _on_circle(points[i - 1], points[i], points[(i + 1) % count], i)
     if not closed:
         for end, beside in ((0, 1), (count - 1, count - 2)):
-            if found[end] is None:
+            if filled[end] is None:
                 chord = _direction(points[min(end, beside)], points[max(end, beside)])
-                neighbour = found[beside]
-                found[end] = chord if neighbour is None else wrap_pi(2.0 * chord - neighbour)
-    return [wrap_pi(heading) for heading in found if heading is not None]
+                neighbour = filled[beside]
+                filled[end] = chord if neighbour is None else wrap_pi(2.0 * chord - neighbour)
+    return [wrap_pi(heading) for heading in filled if heading is not None]
 
 
 def _direction(a: tuple[float, float], b: tuple[float, float]) -> float:

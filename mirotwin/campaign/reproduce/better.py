@@ -58,7 +58,9 @@ class Comparison(msgspec.Struct, frozen=True):
 
 def compare(table: Table, figure: int, rival: str, camera: str, error: str) -> Comparison:
     """One comparison. Seeds that one of the two did not run are left out."""
-    ours, theirs = ({row.seed: row for row in rows_of(table, figure, one, camera)} for one in (PAPER, rival))
+    ours, theirs = (
+        {row.seed: row for row in rows_of(table, figure, controller, camera)} for controller in (PAPER, rival)
+    )
     pairs = [(ours[seed], theirs[seed]) for seed in ours if seed in theirs]
     only_ours = sum(one.settled and not other.settled for one, other in pairs)
     only_theirs = sum(other.settled and not one.settled for one, other in pairs)
@@ -89,9 +91,9 @@ def compare(table: Table, figure: int, rival: str, camera: str, error: str) -> C
 def _errors(pairs: Sequence[tuple[RunRow, RunRow]], name: str) -> list[tuple[float, float]]:
     """Of the pairs of which both settle."""
     both = [
-        (getattr(one, name), getattr(other, name)) for one, other in pairs if one.settled and other.settled
+        (getattr(our, name), getattr(other, name)) for our, other in pairs if our.settled and other.settled
     ]
-    return [(one, other) for one, other in both if one is not None and other is not None]
+    return [(our, other) for our, other in both if our is not None and other is not None]
 
 
 def comparisons(table: Table, rival: str, camera: str, error: str) -> list[Comparison]:

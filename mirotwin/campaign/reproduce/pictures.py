@@ -43,7 +43,7 @@ def draw(path: Path, title: str, tracks: Mapping[str, RobotTrack]) -> None:
                 times_s = [seconds(tick) for tick in errors.ticks]
                 panel.line(times_s, getattr(errors, column), colour=colour, style="thin")
         spans = [panel.spans()[2:] for panel in pair]
-        low, high = min(one[0] for one in spans), max(one[1] for one in spans)
+        low, high = min(span[0] for span in spans), max(span[1] for span in spans)
         for side, panel in enumerate(pair):
             panel.y_range = (low - 0.05 * (high - low), high + 0.05 * (high - low))
             drawing.add(panel, _box(side, top, ERROR))

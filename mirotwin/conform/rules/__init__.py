@@ -51,7 +51,9 @@ def presupposed_first(rules: Sequence[Rule]) -> list[Rule]:
     tried = {rule.id: rule for rule in rules}
     ordered: dict[str, Rule] = {}
     for rule in rules:
-        ordered |= {one.id: tried[one.id] for one in (*presupposed(rule), rule) if one.id in tried}
+        ordered |= {
+            needed.id: tried[needed.id] for needed in (*presupposed(rule), rule) if needed.id in tried
+        }
     return list(ordered.values())
 
 
@@ -59,7 +61,7 @@ def spans(ids: Sequence[str]) -> str:
     """`P01 to P03, P05`, in the order of the rules."""
     places = [place for place, rule in enumerate(ALL) if rule.id in ids]
     parts = []
-    for _, numbered in groupby(enumerate(places), key=lambda one: one[1] - one[0]):
+    for _, numbered in groupby(enumerate(places), key=lambda pair: pair[1] - pair[0]):
         span = [ALL[place].id for _, place in numbered]
         parts.append(" to ".join(dict.fromkeys((span[0], span[-1]))))
     return ", ".join(parts)

@@ -76,10 +76,10 @@ def _formed(script: TrialScript, question: Frame, then_more: bool = False) -> No
 def _badly_formed(received: Sequence[Event], question: Frame, observed: Observed) -> str:
     if len(received) != TELEMETRY.wire_size:
         return f"{len(received)} without a pause"
-    head = bytes(one.value for one in received)[: len(_HEAD)]
+    head = bytes(character.value for character in received)[: len(_HEAD)]
     if head != _HEAD:
         return f"{head.hex(' ')} first"
-    if not all(one.good_stop for one in received):
+    if not all(character.good_stop for character in received):
         return "a bad stop bit"
     baud = (
         BITS_PER_CHARACTER * TICKS_PER_SECOND * (len(received) - 1) / (received[-1].tick - received[0].tick)
@@ -225,7 +225,7 @@ def positions(script: TrialScript) -> None:
         script.team(script.same(13000, -12000), gap_ms=50.0)
     _says(script, "the real positions", _positions)
     for _ in range(_AT_SPEED):
-        question = script.ask(what="question at speed", words=script.same(13000, -12000), gap_ms=36.0)
+        question = script.ask(label="question at speed", words=script.same(13000, -12000), gap_ms=36.0)
         wanted = f"positions of one sample each in the answer to {question.what}"
         script.answered(question, wanted, _read_at_once)
     for _ in range(7):
@@ -265,13 +265,15 @@ def _read_at_once(content: TelemetryFrame, answer: ReceivedAnswer, observed: Obs
             where = (
                 f"{number(position)} of the {side} wheel, of which {', '.join(map(number, read))} was read"
             )
-            mixed = any(position in (one & 0xFF00 | other & 0xFF, one) for one in read for other in read)
+            mixed = any(
+                position in (value & 0xFF00 | other & 0xFF, value) for value in read for other in read
+            )
             return f"{where}: its bytes are of two samples" if mixed else where
     return _positions(content, answer, observed)
 
 
 def _within(position: int, ends: tuple[int, int]) -> bool:
-    """Whether these 16 bits are a position between the ends, or two counts beyond."""
+    """True if these 16 bits are a position between the ends, or two counts beyond."""
     low, high = min(ends) - 2, max(ends) + 2
     return (position - low) & 0xFFFF <= high - low
 

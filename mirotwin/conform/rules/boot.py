@@ -49,7 +49,7 @@ def reset_together(script: TrialScript) -> None:
 
     @script.expects(end, "RESET sent to both LM629 or none")
     def alone(observed: Observed) -> Found:
-        resets = [(one.tick, one.side) for one in observed.commands if one.opcode == _RESET]
+        resets = [(command.tick, command.side) for command in observed.commands if command.opcode == _RESET]
         for tick, side in resets:
             if len([at for at, _ in resets if at == tick]) != len(SIDES):
                 yield tick, f"RESET to the {side} one"

@@ -42,7 +42,7 @@ def both_types(script: TrialScript) -> None:
     after = ""
     for ask in (False, True, True, False):
         name = "question" if ask else "team frame"
-        script.obeyed(script.team(ask=ask, what=name + after))
+        script.obeyed(script.team(ask=ask, label=name + after))
         after = f" after a {name}"
 
 
@@ -80,7 +80,7 @@ def saturation(script: TrialScript) -> None:
 def _drive(script: TrialScript, left: int, right: int, **how: Unpack[How]) -> Frame:
     """Sends a frame with these velocities, and expects that the wheels obey it."""
     return script.obeyed(
-        script.team(script.same(left, right), what=f"team frame with {left}, {right}", **how)
+        script.team(script.same(left, right), label=f"team frame with {left}, {right}", **how)
     )
 
 

@@ -66,7 +66,7 @@ def _stop_of_a_busy_robot(script: TrialScript) -> None:
         script.acceleration(DEFAULT_ACCELERATION, gap_ms=0.0)
         script.wait(112.0)
         script.characters(SYNC * syncs)
-        stops_behind(script, script.obeyed(script.team(what=f"team frame after {syncs} syncs", lead=b"")))
+        stops_behind(script, script.obeyed(script.team(label=f"team frame after {syncs} syncs", lead=b"")))
         script.wait(130.0)
 
 
@@ -190,7 +190,7 @@ def _in_time(script: TrialScript, last: Frame, after_ticks: int, order_kind: str
 
     def when(observed: Observed, side: str) -> str:
         after = [order.tick for order in observed.orders[side] if order.tick > last.end_tick]
-        tick = next((one for one in after if done(observed, side, one)), None)
+        tick = next((later for later in after if done(observed, side, later)), None)
         if tick is None:
             return f"{side} not within {in_ms(observed.end_tick - last.end_tick)}"
         return f"{side} at {in_ms(tick - last.end_tick)}"

@@ -18,7 +18,7 @@ def steps(script: TrialScript) -> None:
     script.seq = 30 + 20 * script.network
     script.obeyed(script.team())
     for step in range(1, FRESH_STEPS + 1):
-        script.obeyed(script.team(step=step, what=f"team frame {step} steps on"))
+        script.obeyed(script.team(step=step, label=f"team frame {step} steps on"))
 
 
 @CHAPTER.rule("P17", FRESHNESS, presupposes="P04 P16", broken="a frame that is not fresh is acted on")
@@ -30,7 +30,7 @@ def stale(script: TrialScript) -> None:
     for count, step in enumerate((0, *every)):
         if count % 2 == 0:
             script.obeyed(script.team(lead=b"\xff"))
-        script.ignored(script.team(step=step, what=f"team frame {step} steps on", lead=b"", fresh=False))
+        script.ignored(script.team(step=step, label=f"team frame {step} steps on", lead=b"", fresh=False))
     script.obeyed(script.team())
 
 
@@ -48,7 +48,7 @@ def again(script: TrialScript) -> None:
                 script.team(step=0, lead=b"", fresh=False)
             script.wait_until(start)
             name = f"team frame {step} steps on after {after_ms:g} ms"
-            (script.obeyed if fresh else script.ignored)(script.team(step=step, what=name, fresh=fresh))
+            (script.obeyed if fresh else script.ignored)(script.team(step=step, label=name, fresh=fresh))
 
 
 @CHAPTER.rule(
@@ -61,7 +61,7 @@ def again(script: TrialScript) -> None:
 def first(script: TrialScript) -> None:
     """The first valid frame after power-on MUST be fresh, whatever its seq."""
     script.seq = (0, 40, 63, 1)[script.network]
-    script.obeyed(script.team(step=0, what="first team frame"))
+    script.obeyed(script.team(step=0, label="first team frame"))
     script.obeyed(script.team())
 
 
@@ -71,7 +71,7 @@ def repeated(script: TrialScript) -> None:
     script.obeyed(script.team())
     for _ in range(3):
         script.wait(105.0)
-        script.ignored(script.team(step=0, what="team frame with the same seq", fresh=False))
+        script.ignored(script.team(step=0, label="team frame with the same seq", fresh=False))
     script.obeyed(script.team())
 
 
@@ -84,7 +84,7 @@ def one_counter(script: TrialScript) -> None:
     how = How(step=0, fresh=False, lead=b"", gap_ms=12.0)
     for make in (script.ping, script.of_type_2, script.ask_nobody):
         make()
-        script.ignored(script.team(what="team frame with the seq of another type", **how))
+        script.ignored(script.team(label="team frame with the seq of another type", **how))
         script.obeyed(script.team())
-    script.ignored(script.team(ask=True, what="question with the seq of a team frame", **how))
+    script.ignored(script.team(ask=True, label="question with the seq of a team frame", **how))
     script.obeyed(script.team())

@@ -48,7 +48,7 @@ def _turn_in_vain(script: TrialScript, left: int, right: int) -> Frame:
     """The first of some frames, questions too, that tell wheels without gains to turn."""
     script.filter((0, 0, 0, 0), "filter frame without gains")
     words = script.same(left, right)
-    first = script.obeyed(script.team(words, what="team frame to wheels without gains"))
+    first = script.obeyed(script.team(words, label="team frame to wheels without gains"))
     for _ in range(3):
         script.team(words)
         script.ask(words=words)

@@ -31,12 +31,12 @@ def refused(script: TrialScript, ways: Iterable[tuple[str, How]], in_a_row: int 
         if count % in_a_row == 0:
             if count:
                 script.wait(GAP_MS)
-            script.obeyed(script.team(lead=b"\xff", what=f"team frame{before}"))
+            script.obeyed(script.team(lead=b"\xff", label=f"team frame{before}"))
         before = f" after a {mistake}"
         damaged: How = {"lead": b"", "fresh": False, "gap_ms": 0.0, **how}
-        script.ignored(script.team(what=mistake, **damaged))
+        script.ignored(script.team(label=mistake, **damaged))
     script.wait(GAP_MS)
-    script.obeyed(script.team(lead=b"\xff", what=f"team frame{before}"))
+    script.obeyed(script.team(lead=b"\xff", label=f"team frame{before}"))
 
 
 @CHAPTER.rule("P04", RECEPTION, presupposes="P28", broken="a frame is not found by its sync alone")
@@ -55,7 +55,7 @@ def preamble(script: TrialScript) -> None:
         ("with a pause in its preamble", How(pauses={-2: 5000.0})),
     )
     for condition, how in ways:
-        script.obeyed(script.team(what=f"team frame {condition}", **how))
+        script.obeyed(script.team(label=f"team frame {condition}", **how))
 
 
 @CHAPTER.rule("P05", RECEPTION, presupposes="P04")
@@ -157,15 +157,15 @@ def short_pauses(script: TrialScript) -> None:
     """
     offset = script.topology.baud_offset_ppm
     for _ in range(3):
-        script.obeyed(script.team(what=f"team frame of a host {offset / 10_000:+g} %" if offset else ""))
+        script.obeyed(script.team(label=f"team frame of a host {offset / 10_000:+g} %" if offset else ""))
     if not offset:
         places = range(1, script.form.size)
         name = f"team frame with {SHORTEST_US:g} us before"
         everywhere = dict.fromkeys(places, SHORTEST_US)
-        script.obeyed(script.team(what=f"{name} each character", pauses=everywhere))
+        script.obeyed(script.team(label=f"{name} each character", pauses=everywhere))
         for place in places:
             pauses = {place: SHORTEST_US}
-            script.obeyed(script.team(what=f"{name} character {place}", lead=b"", pauses=pauses))
+            script.obeyed(script.team(label=f"{name} character {place}", lead=b"", pauses=pauses))
 
 
 @CHAPTER.rule("P12", RECEPTION, presupposes="P14 P16")
@@ -230,7 +230,7 @@ def garbage(script: TrialScript) -> None:
     )
     for disturbance, characters in kinds:
         script.characters(characters)
-        script.obeyed(script.team(what=f"team frame right after {disturbance}", lead=b""))
+        script.obeyed(script.team(label=f"team frame right after {disturbance}", lead=b""))
     frames = (
         ("a bad stop bit", How(bad_stop=5)),
         ("a pause", How(pauses={7: 400.0})),
@@ -239,9 +239,9 @@ def garbage(script: TrialScript) -> None:
     for disturbance, how in frames:
         damaged: How = {"fresh": False, "gap_ms": 0.0, **how}
         script.team(**damaged)
-        script.obeyed(script.team(what=f"team frame right after one with {disturbance}", lead=b""))
+        script.obeyed(script.team(label=f"team frame right after one with {disturbance}", lead=b""))
     for _ in range(3):  # none of three is lost, without a pause between them
-        script.obeyed(script.team(what="team frame right after another", lead=b"", gap_ms=0.0))
+        script.obeyed(script.team(label="team frame right after another", lead=b"", gap_ms=0.0))
     script.wait(12.0)
 
 
@@ -250,7 +250,7 @@ def false_syncs(script: TrialScript) -> None:
     """A window with a wrong CRC MUST cost no frame: a sync in front of a frame is no reason to lose it."""
     for length in range(2, script.form.size, 3):
         lead = SYNC + bytes(range(0x60, 0x60 + length - 2))
-        script.obeyed(script.team(what=f"team frame {length} characters after a sync", lead=lead))
+        script.obeyed(script.team(label=f"team frame {length} characters after a sync", lead=lead))
 
 
 @CHAPTER.rule(
@@ -259,4 +259,4 @@ def false_syncs(script: TrialScript) -> None:
 def slicer_noise(script: TrialScript) -> None:
     """Between keyed frames, RXD shows slicer noise: the first frame with its preamble MUST be taken all the same."""
     for count in range(8):
-        script.obeyed(script.team(what="team frame after noise", gap_ms=14.0 + 3.7 * count))
+        script.obeyed(script.team(label="team frame after noise", gap_ms=14.0 + 3.7 * count))

@@ -84,7 +84,7 @@ def acceleration_waits(script: TrialScript) -> None:
     _driven_with(script, fast, 9000)
     _sent_in_motion(script, 7000)
     script.obeyed(script.team(_standing(script), gap_ms=15.0))
-    _driven_with(script, script.team(what="team frame while one wheel slows down"), 9000)
+    _driven_with(script, script.team(label="team frame while one wheel slows down"), 9000)
     script.wait(300.0)  # told to stand by the failsafe
     _driven_with(script, script.team(), 7000)
     script.answered(script.ask(gap_ms=40.0))

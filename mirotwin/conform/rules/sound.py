@@ -116,7 +116,7 @@ def _begins_again(script: TrialScript, tick: int, step: int, name: str) -> None:
     script.wait_until(tick + ms(BOOTED_MS))
     script.wait(45.0)
     keeps_off(script, tick, script.now)
-    script.obeyed(script.team(step=step + 1, what=name))
+    script.obeyed(script.team(step=step + 1, label=name))
     script.answered(script.ask(gap_ms=36.0))
 
 
@@ -129,9 +129,9 @@ def load(script: TrialScript) -> None:
         script.acceleration(5973 + count, gap_ms=0.0)
         script.characters(SYNC * 25)
         script.characters(bytes(range(1, 250, 7)))
-        script.obeyed(script.ask(lead=b"", what="question under load"))
+        script.obeyed(script.ask(lead=b"", label="question under load"))
     script.wait(540.0)
-    script.obeyed(script.team(what="team frame after the load"))
+    script.obeyed(script.team(label="team frame after the load"))
 
 
 @LONG.rule("P61", TURNS, presupposes="P34 P41", topologies=THREE)
@@ -162,4 +162,4 @@ def ages(script: TrialScript) -> None:
         script.wait_until(until)
         script.ignored(script.team(step=0, fresh=False))
         script.wait(20.0)
-        script.obeyed(script.team(step=20, what=f"team frame 20 steps on after {silence_ms / 1000:.1f} s"))
+        script.obeyed(script.team(step=20, label=f"team frame 20 steps on after {silence_ms / 1000:.1f} s"))

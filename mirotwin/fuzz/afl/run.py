@@ -108,7 +108,7 @@ def why_ended(log: Path, target: Path) -> BadInput:
     line = aborts[-1][1].strip()
     reason = _REASON.search(text, aborts[-1].end())
     message = f"{line} ({reason[1].strip()})" if reason else line
-    remedy = next((what for part, what in REMEDIES if part in message), _ELSE)
+    remedy = next((advice for part, advice in REMEDIES if part in message), _ELSE)
     return BadInput(log, "", f"afl-fuzz ended: {message}", remedy)
 
 

@@ -63,18 +63,18 @@ def detect(head: bytes) -> Detected:
     whole = len(head) < HEAD_BYTES
     if not head:
         return Detected("raw", "it is empty")
-    if found := _by_first_bytes(head):
-        return found
+    if kind := _by_first_bytes(head):
+        return kind
     if _STREAM.match(text_of(head, whole)):
         return Detected("stream", "its first line is one of ticks")
     if _INTEL_HEX.match(head):
         return Detected("", "is a firmware image (Intel HEX)", "give a capture, or --from-form hex")
-    if found := _by_lines(_lines(head, whole)):
-        return found
+    if kind := _by_lines(_lines(head, whole)):
+        return kind
     if HexText.begins(head, whole):
         return Detected("hex", "nothing but pairs of hex digits")
-    if found := _stamped(_lines(head, whole), loose=True):
-        return found
+    if kind := _stamped(_lines(head, whole), loose=True):
+        return kind
     if TERMINAL.match(head):
         return Detected("putty", "its first line is PuTTY's")
     if is_text(head, whole):

@@ -45,5 +45,5 @@ def telemetry_count(sent: Iterable[Transmission]) -> int:
 
 
 def is_telemetry(head: Sequence[Transmission]) -> bool:
-    """Whether characters read as robots' answers rather than as a host's frames."""
+    """True if characters read as robots' answers rather than as a host's frames."""
     return telemetry_count(head) > max(frame_counts(head).values())

@@ -51,7 +51,7 @@ def _in_block(line: str) -> re.Match[str] | None:
 
 
 def _is_plain(match: re.Match[str], loose: bool = False) -> bool:
-    """Whether the time cannot be taken for characters or for an offset."""
+    """True if the time cannot be taken for characters or for an offset."""
     number, words = match["number"], match["words"]
     if number is None or "." in number or match["unit"] or match["before"]:
         return True

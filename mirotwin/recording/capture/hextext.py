@@ -36,7 +36,7 @@ class HexText:
 
     @staticmethod
     def begins(text: bytes, whole: bool) -> bool:
-        """Whether `text` holds at least one pair and nothing else but separators and comments.
+        """True if `text` holds at least one pair and nothing else but separators and comments.
 
         If it is not the `whole` text it may end in half a pair.
         """
@@ -75,11 +75,11 @@ class HexText:
 
     @property
     def failed(self) -> bool:
-        """Whether there is something that no more text can mend."""
+        """True if there is something that no more text can mend."""
         return bool(self._rest) and not self._pending()
 
     def _pending(self) -> bool:
-        """Whether what is left over is the first half of something."""
+        """True if what is left over is the first half of something."""
         return BOM.startswith(self._rest) or (len(self._rest) == 1 and _DIGIT.match(self._rest) is not None)
 
     def _advance(self, text: bytes) -> None:

@@ -46,7 +46,7 @@ class Input:
         return status.st_size if stat.S_ISREG(status.st_mode) else None
 
     def _readable(self, status: os.stat_result) -> bool:
-        """Whether a character device has an end: the null device, or a terminal with a keyboard."""
+        """True if a character device has an end: the null device, or a terminal with a keyboard."""
         return self._file.isatty() or os.path.samestat(status, os.stat(os.devnull))
 
     def peek(self, size: int = HEAD_BYTES) -> bytes:

@@ -77,8 +77,8 @@ class Joiner:
                 yield from self._ready()
         except BadInput as error:
             failure = error
-        for one in self._open.values():
-            self._push(one.closed())
+        for group in self._open.values():
+            self._push(group.closed())
         self._open = {}
         yield from self._ready()
         if self._usual and self._late_ticks > _TOLD_TICKS + self.facts.resolution_ticks:
@@ -125,34 +125,34 @@ class Joiner:
         if not piece.data:
             return
         key = (piece.line, piece.direction)
-        one = self._open.get(key)
+        group = self._open.get(key)
         tick = piece.tick
-        spacing = self.facts.spacing_ticks or (character_ticks(one.direction) if one else SPACING_TICKS)
-        if one is not None and self._follows(one, tick, spacing):
+        spacing = self.facts.spacing_ticks or (character_ticks(group.direction) if group else SPACING_TICKS)
+        if group is not None and self._follows(group, tick, spacing):
             if tick is None:
-                tick = one.next_tick
-            self._late_ticks = max(self._late_ticks, one.end_tick - tick)
-            if len(one.data) >= LONGEST:
-                self._push(one.closed())
-                one = self._open[key] = _Open(piece, one.end_tick)
-            one.append(piece, tick, spacing)
+                tick = group.next_tick
+            self._late_ticks = max(self._late_ticks, group.end_tick - tick)
+            if len(group.data) >= LONGEST:
+                self._push(group.closed())
+                group = self._open[key] = _Open(piece, group.end_tick)
+            group.append(piece, tick, spacing)
             return
         tick = tick or 0
-        if one is not None:
+        if group is not None:
             self._push(self._open.pop(key).closed())
         for other, late in [*self._open.items()]:
             if tick > late.end_tick + 2 * late.step + self.facts.resolution_ticks:
                 self._push(self._open.pop(other).closed())
-        one = self._open[key] = _Open(piece, tick)
-        one.append(piece, tick, spacing)
+        group = self._open[key] = _Open(piece, tick)
+        group.append(piece, tick, spacing)
 
-    def _follows(self, one: _Open, tick: int | None, spacing: int) -> bool:
+    def _follows(self, group: _Open, tick: int | None, spacing: int) -> bool:
         if tick is None:
             return True
-        if tick < one.tick:  # goes back: another session, or an unsorted capture
-            return one.tick - tick <= self.facts.resolution_ticks
+        if tick < group.tick:  # goes back: another session, or an unsorted capture
+            return group.tick - tick <= self.facts.resolution_ticks
         tolerance = SPACING_TOLERANCE_TICKS * spacing // SPACING_TICKS + self.facts.resolution_ticks
-        return tick < one.end_tick or abs(tick - one.next_tick) <= tolerance
+        return tick < group.end_tick or abs(tick - group.next_tick) <= tolerance
 
     def _push(self, sent: Transmission) -> None:
         heapq.heappush(self._done, (sent.tick, self._count, sent))
@@ -160,7 +160,7 @@ class Joiner:
 
     def _ready(self) -> Iterator[Transmission]:
         """Those before which nothing comes any more."""
-        first = min((one.tick for one in self._open.values()), default=None)
+        first = min((group.tick for group in self._open.values()), default=None)
         while self._done and (first is None or self._done[0][0] <= first):
             yield heapq.heappop(self._done)[-1]
 
@@ -182,7 +182,7 @@ def fitted_spacing(head: list[Piece]) -> int:
     if len(spacings) < 8:
         return 0
     shortest = spacings[len(spacings) // 20]
-    spacing = round(median(one for one in spacings if one <= shortest * 1.3))
+    spacing = round(median(ticks for ticks in spacings if ticks <= shortest * 1.3))
     if abs(spacing - SPACING_TICKS) <= SPACING_TOLERANCE_TICKS:
         return 0
     return spacing if standard_baud(BITS_PER_CHARACTER * TICKS_PER_SECOND / spacing) else 0

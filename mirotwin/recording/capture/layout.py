@@ -17,7 +17,7 @@ SHOWN_NETWORKS = 8
 
 def robots_in(head: Sequence[Transmission], network: int) -> tuple[int, str]:
     """(3 or 5, a note for the user or nothing) for a network whose first transmissions are in `head`."""
-    sent = [one for one in head if one.network == network and one.direction == DOWN]
+    sent = [piece for piece in head if piece.network == network and piece.direction == DOWN]
     counts = frame_counts(sent)
     best = max(ROBOT_COUNTS, key=lambda count: (counts[count], -count))
     others = [count for count in ROBOT_COUNTS if count != best and counts[count]]
@@ -64,7 +64,7 @@ class Layouts:
 
     def __str__(self) -> str:
         """`, network 0 of 3 robots` of all networks in the head, if they are few."""
-        networks = sorted({one.network for one in self.head})
+        networks = sorted({sent.network for sent in self.head})
         if len(networks) > SHOWN_NETWORKS:
             return f", {len(networks)} networks"
         return "".join(f", network {network} of {self.of(network)} robots" for network in networks)

@@ -45,7 +45,7 @@ class Source(msgspec.Struct):
 
     @property
     def timed(self) -> bool:
-        """Whether ticks are times; without them they only count characters."""
+        """True if ticks are times; without them they only count characters."""
         return self.form.timed
 
     @property
@@ -127,41 +127,41 @@ def _directed(
         head, everything = head_of(sent)
     if _is_turned(head):
         facts.tell(f"{facts.label}: was captured at the robot: what it calls sent is from the robot")
-        head = [_turned(one) for one in head]
+        head = [_turned(piece) for piece in head]
         everything = map(_turned, everything)
     places: dict[int, tuple[str, int]] = {}
     taken = dict.fromkeys(DIRECTIONS.values(), 0)
-    for wire in sorted({one.network for one in head}):
-        own = [one for one in head if one.network == wire]
-        silent = [one for one in own if not one.direction]
+    for wire in sorted({piece.network for piece in head}):
+        own = [piece for piece in head if piece.network == wire]
+        silent = [piece for piece in own if not piece.direction]
         looks_up = requested is None and bool(silent) and is_telemetry(silent)
         direction = UP if looks_up else DIRECTIONS[requested or "down"]
-        directions = {one.direction or direction for one in own}
+        directions = {piece.direction or direction for piece in own}
         places[wire] = direction, max(taken[each] for each in directions)
         taken.update(dict.fromkeys(directions, places[wire][1] + 1))
     usual = DIRECTIONS[requested or "down"]
-    for one in everything:
-        direction, network = places.get(one.network, (usual, one.network))
-        if one.direction and network == one.network:
-            yield one
+    for piece in everything:
+        direction, network = places.get(piece.network, (usual, piece.network))
+        if piece.direction and network == piece.network:
+            yield piece
             continue
-        tick = one.tick
+        tick = piece.tick
         if not form.timed:  # it only counts characters
             tick = tick // character_ticks("") * character_ticks(direction)
-        direction = one.direction or direction
-        yield msgspec.structs.replace(one, tick=tick, direction=direction, network=network)
+        direction = piece.direction or direction
+        yield msgspec.structs.replace(piece, tick=tick, direction=direction, network=network)
 
 
 def _is_turned(head: Sequence[Transmission]) -> bool:
-    """Whether frames are in these only if directions are the other way round."""
-    down, up = ([one for one in head if one.direction == way] for way in (DOWN, UP))
+    """True if frames are in these only if directions are the other way round."""
+    down, up = ([sent for sent in head if sent.direction == way] for way in (DOWN, UP))
     if any(frame_counts(down).values()) or telemetry_count(up):
         return False
     return any(frame_counts(up).values()) or bool(telemetry_count(down))
 
 
-def _turned(one: Transmission) -> Transmission:
-    return msgspec.structs.replace(one, direction={DOWN: UP, UP: DOWN}.get(one.direction, one.direction))
+def _turned(sent: Transmission) -> Transmission:
+    return msgspec.structs.replace(sent, direction={DOWN: UP, UP: DOWN}.get(sent.direction, sent.direction))
 
 
 def _raw(given: Input) -> Iterator[bytes]:

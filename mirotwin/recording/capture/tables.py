@@ -134,9 +134,9 @@ def _timed(names: Sequence[str], rows: Sequence[Sequence[str]], delimiter: str, 
         )
     if not levels:
         return None
-    found = tuple(names[column] for column in levels)
+    level_names = tuple(names[column] for column in levels)
     return Table(
-        kind="edges", delimiter=delimiter, start=start, time=time, levels=levels, names=found, unit=unit
+        kind="edges", delimiter=delimiter, start=start, time=time, levels=levels, names=level_names, unit=unit
     )
 
 
@@ -148,9 +148,14 @@ def _samples(
     levels = tuple(column for column in columns if all(_LEVEL.fullmatch(row[column].strip()) for row in rows))
     if not levels or not rows:
         return None
-    found = tuple(names[column] if headed else f"{column}" for column in levels)
+    level_names = tuple(names[column] if headed else f"{column}" for column in levels)
     return Table(
-        kind="samples", delimiter=delimiter, start=number + headed, levels=levels, names=found, rate_hz=rate
+        kind="samples",
+        delimiter=delimiter,
+        start=number + headed,
+        levels=levels,
+        names=level_names,
+        rate_hz=rate,
     )
 
 
@@ -165,7 +170,7 @@ def _errors(names: Sequence[str]) -> tuple[int, ...]:
 
 
 def _decimal(values: Sequence[str]) -> bool:
-    """Whether values are decimal numbers: digits only, and not all of two."""
+    """True if values are decimal numbers: digits only, and not all of two."""
     return bool(values) and all(map(str.isdecimal, values)) and any(len(value) != 2 for value in values)
 
 

@@ -21,7 +21,7 @@ def text_of(head: bytes, whole: bool) -> str:
 
 
 def is_text(head: bytes, whole: bool) -> bool:
-    """Whether these bytes are surely text: UTF-8 or marked UTF-16 without control characters."""
+    """True if these bytes are surely text: UTF-8 or marked UTF-16 without control characters."""
     encoding, mark = _encoding(head, whole)
     text = text_of(head, whole)
     known = encoding == "utf-8" or encoding.startswith("utf-16")

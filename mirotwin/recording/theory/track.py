@@ -61,7 +61,7 @@ class Broken:
         self.first_tick = self.last_tick = -1
 
     def note(self, tick: int, broken: bool) -> bool:
-        """Whether all is as it should be."""
+        """True if all is as it should be."""
         if broken:
             self.first_tick = self.first_tick if self.count else tick
             self.last_tick = tick

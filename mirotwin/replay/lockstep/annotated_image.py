@@ -79,7 +79,7 @@ def annotated_of(image: Image, images: Sequence[Image], sources: Sequence[str]) 
 
 
 def same_layout(image: Image, other: Image) -> bool:
-    """Whether all code, and what has a name, lies at the same addresses in both: then PC is compared with PC.
+    """True if all code, and what has a name, lies at the same addresses in both: then PC is compared with PC.
 
     Where one of them has no symbols, the extent of the code decides.
     """

@@ -96,7 +96,7 @@ class Record(msgspec.Struct, frozen=True):
 
 def _as_json(value: Any) -> Any:
     if isinstance(value, tuple):
-        return [_as_json(one) for one in value]
+        return [_as_json(inner) for inner in value]
     return value.as_json() if isinstance(value, Record) else value
 
 
@@ -135,16 +135,16 @@ def differing(world: World, other: World) -> Iterator[FieldDifference]:
 
 def _name_of_part(world: World, path: str) -> str | None:
     """The name of the part that a field belongs to; None where it belongs to none."""
-    found = _PART.match(path)
-    if found is None:
+    match = _PART.match(path)
+    if match is None:
         return None
-    line, device, part = map(int, found.groups())
+    line, device, part = map(int, match.groups())
     name: str = world.lines[line].devices[device].board.parts[part].name
     return name
 
 
 def _is_apart(root: Any, path: str) -> bool:
-    """Whether a table names it, or a part that it belongs to, in `NOT_HASHED`: it enters no digest."""
+    """True if a table names it, or a part that it belongs to, in `NOT_HASHED`: it enters no digest."""
     part = root
     for name, index in _STEP.findall(path):
         if any(name in cls.__dict__.get("NOT_HASHED", ()) for cls in type(part).__mro__):

@@ -165,7 +165,7 @@ class Stepper:
                 if (lasting := _lasting(here.steps, there.steps)) is not None
             ]
             if differences:
-                return min(differences, key=lambda one: one.one.tick)
+                return min(differences, key=lambda difference: difference.one.tick)
 
     def _pieces(self, tick: int, end_tick: int) -> Iterator[tuple[InstructionLog, InstructionLog]]:
         """Runs both to `tick` and in pieces on to `end_tick`; all devices of the first piece that is not the same."""

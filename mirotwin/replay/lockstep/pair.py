@@ -60,7 +60,7 @@ class WorldPair:
 
     @property
     def over(self) -> bool:
-        """Whether one of them does not go on."""
+        """True if one of them does not go on."""
         return self.one.stopped or self.other.stopped
 
     def run_to(self, tick: int) -> None:

@@ -76,10 +76,10 @@ class Builds:
             if self._look(before):
                 before = self.pair.mark()
                 self.last_tick = self.pair.tick
-        differences = sorted((self.since or self.gone).values(), key=lambda one: one[0].tick)
+        differences = sorted((self.since or self.gone).values(), key=lambda pair: pair[0].tick)
         return [
-            self._traced(one, mark) if index < TRACED else one
-            for index, (one, mark) in enumerate(differences)
+            self._traced(difference, mark) if index < TRACED else difference
+            for index, (difference, mark) in enumerate(differences)
         ]
 
     def _look(self, before: tuple[Mark, Mark]) -> bool:

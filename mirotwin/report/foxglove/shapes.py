@@ -40,8 +40,8 @@ def paint(name: str, alpha: float = 1.0) -> Color:
 
 def box(low: tuple[float, float, float], high: tuple[float, float, float], color: Color) -> SolidPrimitive:
     """Between two corners."""
-    middle = Vector3(*((one + other) / 2.0 for one, other in zip(low, high, strict=True)))
-    size = Vector3(*(other - one for one, other in zip(low, high, strict=True)))
+    middle = Vector3(*((first + other) / 2.0 for first, other in zip(low, high, strict=True)))
+    size = Vector3(*(other - first for first, other in zip(low, high, strict=True)))
     return SolidPrimitive(Pose(middle, STRAIGHT), size, color)
 
 

@@ -74,7 +74,7 @@ def time_range(times_s: list[float], period_s: float) -> Range1d:
 
 def at_least(span: float, *columns: Any) -> tuple[float, float] | None:
     """Ends of an axis that is `span` wide, where the numbers vary by less: an axis never shows rounding noise."""
-    values = np.concatenate([np.asarray(one, dtype=np.float64) for one in columns])
+    values = np.concatenate([np.asarray(column, dtype=np.float64) for column in columns])
     values = values[np.isfinite(values)]
     if not values.size or values.max() - values.min() >= span:
         return None

@@ -56,24 +56,31 @@ def board_page(material: Material, first_tick: int, end_tick: int) -> bytes:
     waves, values = again.watch.waves(first_tick, end_tick), again.watch.values(first_tick, end_tick)
     least = min(sorted(len(wave.ticks) for wave in waves)[-MOST_LANES:], default=0)
     pins = [wave for wave in waves if len(wave.ticks) >= least]
-    displays = [one for one in values if one.path.endswith(".text") and isinstance(one.values[0], str)]
-    rows_of = tuple(f"{one.path.removesuffix('text')}row" for one in displays)
-    beside = [one for one in values if one not in displays and not one.path.startswith(rows_of)]
-    moved = [one for one in values if one.changes and (one in beside or one in displays)]
-    curves = _together([one for one in moved if not _is_state(one)], scenario)
-    wire = [one for period in material.periods for one in period.wire if first_tick <= one.tick < end_tick]
-    by_path = {one.path: one for one in values}
+    displays = [
+        changed for changed in values if changed.path.endswith(".text") and isinstance(changed.values[0], str)
+    ]
+    rows_of = tuple(f"{changed.path.removesuffix('text')}row" for changed in displays)
+    beside = [
+        changed for changed in values if changed not in displays and not changed.path.startswith(rows_of)
+    ]
+    moved = [changed for changed in values if changed.changes and (changed in beside or changed in displays)]
+    curves = _together([changed for changed in moved if not _is_state(changed)], scenario)
+    wire = [sent for period in material.periods for sent in period.wire if first_tick <= sent.tick < end_tick]
+    by_path = {changed.path: changed for changed in values}
     cars: dict[str, Any] = {name: keys for name, keys in scenario.parts.items() if _is_car(keys)}
     marks = _marks(material, wire, scenario)
-    marks = [one for one in marks if first_tick <= one.end_tick and one.start_tick < end_tick]
-    ticks = [*(one.tick for one in again.result.failures), *(fault.tick for _, _, fault in again.faults)]
+    marks = [mark for mark in marks if first_tick <= mark.end_tick and mark.start_tick < end_tick]
+    ticks = [
+        *(failure.tick for failure in again.result.failures),
+        *(fault.tick for _, _, fault in again.faults),
+    ]
     ticks = sorted({tick for tick in ticks if first_tick <= tick <= end_tick})
     figures = board_figures(
         window,
         marks,
         pins,
         curves,
-        [mark for one in moved if _is_state(one) for mark in _state_marks(one, end_tick)],
+        [mark for changed in moved if _is_state(changed) for mark in _state_marks(changed, end_tick)],
         ticks,
     )
     marks.sort(key=attrgetter("start_tick"))  # not before: lanes stand in the order of `_marks`
@@ -85,8 +92,10 @@ def board_page(material: Material, first_tick: int, end_tick: int) -> bytes:
         "end": end_tick,
         "step": step,
         "failures": ticks,
-        "marks": [(one.start_tick, one.lane, one.kind, one.text) for one in marks],
-        "values": {one.path: (one.ticks, [_plain(value) for value in one.values]) for one in values},
+        "marks": [(mark.start_tick, mark.lane, mark.kind, mark.text) for mark in marks],
+        "values": {
+            changed.path: (changed.ticks, [_plain(value) for value in changed.values]) for changed in values
+        },
         "ways": {name: [f"{name}.{key}" for key in keys.PATH] for name, keys in cars.items()},
     }
     sections = {
@@ -101,7 +110,7 @@ def board_page(material: Material, first_tick: int, end_tick: int) -> bytes:
         "waves": waves,
         "pins": [wave.name for wave in pins],
         "close": [wave.name for wave in pins if len(wave.drawn(window.span)[1])],
-        "thinned": [one.path for one in values if len(one.ticks) <= one.changes],
+        "thinned": [changed.path for changed in values if len(changed.ticks) <= changed.changes],
         "curves": curves,
         "displays": displays,
         "beside": beside,
@@ -112,23 +121,23 @@ def board_page(material: Material, first_tick: int, end_tick: int) -> bytes:
 
 
 def _is_car(keys: Any) -> bool:
-    """Whether a part with these keys moves on a plane."""
+    """True if a part with these keys moves on a plane."""
     return all(hasattr(keys, key) for key in ("PATH", "walls", "lines", "picture", "cell_cm", "radius_cm"))
 
 
-def _is_state(one: Changed) -> bool:
-    """Whether it is drawn as bars: it is a text, if only at times, or on and off."""
-    return any(isinstance(value, str) for value in one.values) or all(
-        type(value) is not float and value in (0, 1) for value in one.values
+def _is_state(changed: Changed) -> bool:
+    """True if it is drawn as bars: it is a text, if only at times, or on and off."""
+    return any(isinstance(value, str) for value in changed.values) or all(
+        type(value) is not float and value in (0, 1) for value in changed.values
     )
 
 
 def _together(numbers: Sequence[Changed], scenario: BoardScenario) -> list[list[Changed]]:
     """Values of one key of parts of one kind in one figure, as long as there are colours."""
     groups: dict[tuple[str, str], list[Changed]] = {}
-    for one in numbers:
-        kind = scenario.parts[one.path.partition(".")[0]].name
-        groups.setdefault((kind, one.path.rpartition(".")[2]), []).append(one)
+    for changed in numbers:
+        kind = scenario.parts[changed.path.partition(".")[0]].name
+        groups.setdefault((kind, changed.path.rpartition(".")[2]), []).append(changed)
     most = len(ROBOT_COLOURS)
     return [some[at : at + most] for some in groups.values() for at in range(0, len(some), most)]
 
@@ -137,7 +146,7 @@ def _rows(wire: Sequence[Transmission], clock: int, character_ticks: int) -> lis
     """What was sent, each way in lines: to a line end, a pause, or what went the other way."""
     rows: list[SerialRow] = []
     end_tick = 0
-    for sent in sorted(wire, key=lambda one: one.tick):
+    for sent in sorted(wire, key=lambda transmission: transmission.tick):
         for number in range(len(sent.data)):
             tick, character = sent.tick + number * character_ticks, sent.data[number : number + 1]
             near = tick - end_tick < clock * TOGETHER_MS // 1000
@@ -150,7 +159,7 @@ def _rows(wire: Sequence[Transmission], clock: int, character_ticks: int) -> lis
 
 
 def _goes_on(line: bytes, character: bytes) -> bool:
-    """Whether a character belongs to the line before it."""
+    """True if a character belongs to the line before it."""
     ended = line.endswith(b"\n") or (line.endswith(b"\r") and character != b"\n")
     return not ended and len(line) < LONGEST_ROW
 
@@ -178,12 +187,14 @@ def _character_ticks(scenario: BoardScenario) -> int:
     return CHARACTER_BITS * (scenario.host_bit_ticks or scenario.clock // 9600)
 
 
-def _state_marks(one: Changed, end_tick: int) -> list[LinkMark]:
+def _state_marks(changed: Changed, end_tick: int) -> list[LinkMark]:
     """A bar for each text, equal ones of one colour, and for each time that something is on."""
-    seen = list(dict.fromkeys(one.values))
+    seen = list(dict.fromkeys(changed.values))
     return [
-        LinkMark(one.path, ROBOT_COLOURS[seen.index(value) % len(ROBOT_COLOURS)], begin, end, _short(value))
-        for (begin, end), value in zip(pairwise([*one.ticks, end_tick]), one.values, strict=True)
+        LinkMark(
+            changed.path, ROBOT_COLOURS[seen.index(value) % len(ROBOT_COLOURS)], begin, end, _short(value)
+        )
+        for (begin, end), value in zip(pairwise([*changed.ticks, end_tick]), changed.values, strict=True)
         if value
     ]
 

@@ -113,13 +113,13 @@ def _wave(made: Any, wave: Wave, row: int, window: Window) -> None:
 
 def _states(states: Sequence[LinkMark], window: Window) -> Any:
     """Texts and what is on as bars, with the text where there is room in a wide window; the page hides it else."""
-    made = lanes_figure(states, window.times, window.seconds, {one: one for one in ROBOT_COLOURS})
+    made = lanes_figure(states, window.times, window.seconds, {colour: colour for colour in ROBOT_COLOURS})
     for bars in made.renderers:
         bars.glyph.fill_alpha = TEXT_ALPHA
     share = window.span * TEXT_SHARE
-    wide = [one for one in states if one.end_tick - one.start_tick > share * (2 + len(one.text))]
-    begins = window.seconds([one.start_tick for one in wide])
-    columns = {"lane": [one.lane for one in wide], "t": begins, "text": [one.text for one in wide]}
+    wide = [mark for mark in states if mark.end_tick - mark.start_tick > share * (2 + len(mark.text))]
+    begins = window.seconds([mark.start_tick for mark in wide])
+    columns = {"lane": [mark.lane for mark in wide], "t": begins, "text": [mark.text for mark in wide]}
     fonts = {"text_font": value(FONT), "text_font_size": value(SIZE), "text_baseline": value("middle")}
     names = made.text(
         "t", "lane", "text", source=ColumnDataSource(columns), x_offset=5, tags=["wide"], **fonts
@@ -131,12 +131,12 @@ def _states(states: Sequence[LinkMark], window: Window) -> Any:
 def _curves(together: Sequence[Changed], window: Window) -> Any:
     """Values of one kind: each holds until the next change that was seen. Of equal ones all can be seen."""
     made = panel("", window.times, height=116)
-    everything = np.concatenate([np.array(one.values, dtype=np.float64) for one in together])
+    everything = np.concatenate([np.array(changed.values, dtype=np.float64) for changed in together])
     if (ends := at_least(max(LEAST_SHARE * np.abs(everything).max(), LEAST), everything)) is not None:
         made.y_range = Range1d(*ends)
-    for number, one in enumerate(together):
-        values = np.array([*one.values, one.values[-1]], dtype=np.float64)
-        source = ColumnDataSource({"t": window.seconds([*one.ticks, window.end_tick]), "value": values})
+    for number, changed in enumerate(together):
+        values = np.array([*changed.values, changed.values[-1]], dtype=np.float64)
+        source = ColumnDataSource({"t": window.seconds([*changed.ticks, window.end_tick]), "value": values})
         width = max(1.0, 2.6 - 0.7 * number)
         line = made.step("t", "value", source=source, line_width=width, mode="after")
         tagged(line.glyph, line_color=ROBOT_COLOURS[number])

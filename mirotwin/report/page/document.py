@@ -52,7 +52,7 @@ def render(template: str, figures: dict[str, Any], data: bytes, values: dict[str
 
 
 def is_page(path: Path) -> bool:
-    """Whether the file is one that `render` made."""
+    """True if the file is one that `render` made."""
     if not path.is_file():
         return False
     with open(path, "rb") as file:

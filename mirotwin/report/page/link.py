@@ -150,11 +150,19 @@ class LinkLog:
         marks: list[LinkMark] = []
         for network in self.world.networks:
             index = network.index
-            sent = [one for one in self.wire if one.network == index and one.direction == DOWN]
-            received = [one for one in self.wire if one.network == index and one.direction != DOWN]
-            named = [_named(one, network.spec.robots) for one in sent]
+            sent = [
+                transmission
+                for transmission in self.wire
+                if transmission.network == index and transmission.direction == DOWN
+            ]
+            received = [
+                transmission
+                for transmission in self.wire
+                if transmission.network == index and transmission.direction != DOWN
+            ]
+            named = [_named(transmission, network.spec.robots) for transmission in sent]
             delay = ticks(network.spec.radio.latency_s)
-            marks += [_sent(one, name) for one, name in zip(sent, named, strict=True)]
+            marks += [_sent(transmission, name) for transmission, name in zip(sent, named, strict=True)]
             for robot in network.robots:
                 arrivals = self._arrivals[index, robot.slot]
                 arrivals.flush()
@@ -174,7 +182,7 @@ def lanes_of(marks: Sequence[LinkMark]) -> list[str]:
 def _named(sent: Transmission, robots: int) -> str:
     """The content of the frames in a transmission; empty where it holds none."""
     decoder = Decoder(robots)
-    frames = [one for one in [*decoder.hear(sent), *decoder.flush()] if isinstance(one, Received)]
+    frames = [event for event in [*decoder.hear(sent), *decoder.flush()] if isinstance(event, Received)]
     return ", ".join(_content(frame, robots) for frame in frames)
 
 

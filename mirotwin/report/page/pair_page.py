@@ -53,20 +53,20 @@ def pair_page(first: Side, other: Side) -> bytes:
     robots, notes = _common(first, other)
     tracks = [side.tracks(robots) for side in sides]
     here, there = (only_robots(side.periods, robots) for side in sides)
-    found = [one for one in differences(here, there, RULE) if not _of_one_law(one)]
+    parted = [difference for difference in differences(here, there, RULE) if not _of_one_law(difference)]
     origins = [*source_differences(first.made_from, other.made_from)]
     if origins:
         more = f" and {len(origins) - 1} more" if len(origins) > 1 else ""
         notes.insert(0, f"They were not made from the same: {origins[0].key}{more}.")
-    marked = [found[0].tick] if found else []
-    longer = max(tracks, key=lambda one: len(one.ticks))
-    both = PageTracks(longer.first, longer.ticks, [robot for one in tracks for robot in one.robots])
+    marked = [parted[0].tick] if parted else []
+    longer = max(tracks, key=lambda track: len(track.ticks))
+    both = PageTracks(longer.first, longer.ticks, [robot for track in tracks for robot in track.robots])
     count = len(robots)
     several = count > 1
     labels = [
         f"{name}{robot.id[1] if several else ''}"
-        for name, one in zip(NAMES, tracks, strict=True)
-        for robot in one.robots
+        for name, track in zip(NAMES, tracks, strict=True)
+        for robot in track.robots
     ]
     colours = [0] * count + [1] * count
     figures = pair_figures(tracks[0], tracks[1], marked)
@@ -81,16 +81,16 @@ def pair_page(first: Side, other: Side) -> bytes:
         "origins": origins,
         "told": [origin for origin in origins if "code" not in origin.key][:3],
         "rows": _rows(sides, tracks),
-        "differences": found,
-        "channels": first_per_channel(found),
+        "differences": parted,
+        "channels": first_per_channel(parted),
     }
     return render("pair.html", figures, page_data(both, [], [], marked, count), values)
 
 
-def _of_one_law(one: Difference) -> bool:
-    """Whether it is an inner value that only the law or the estimator of one run has."""
-    inner = one.channel.startswith(("control inner.", "control estimate."))
-    return inner and None in (one.recorded, one.replayed)
+def _of_one_law(difference: Difference) -> bool:
+    """True if it is an inner value that only the law or the estimator of one run has."""
+    inner = difference.channel.startswith(("control inner.", "control estimate."))
+    return inner and None in (difference.recorded, difference.replayed)
 
 
 def _common(first: Side, other: Side) -> tuple[list[RobotId], list[str]]:
@@ -129,21 +129,25 @@ def _rows(sides: Sequence[Side], tracks: Sequence[PageTracks]) -> list[tuple[str
         ("scenario", [side.job.spec.scenario.name for side in sides]),
         ("seed", [f"{side.job.spec.seed}" for side in sides]),
         ("firmware", [image.sha256[:12] or "no file" for image in images]),
-        ("duration", [f"{len(one.ticks) * CONTROL_PERIOD_TICKS / TICKS_PER_SECOND:.2f} s" for one in tracks]),
+        (
+            "duration",
+            [f"{len(track.ticks) * CONTROL_PERIOD_TICKS / TICKS_PER_SECOND:.2f} s" for track in tracks],
+        ),
     ]
-    for pair in zip(*(one.robots for one in tracks), strict=True):
+    for pair in zip(*(track.robots for track in tracks), strict=True):
         if all(robot.steered for robot in pair):
             of = [tracking_of(robot.errors) for robot in pair]
-            rms = [f"{one.rms_position_cm:.2f} cm, {one.rms_theta_deg:.2f}\u00b0" for one in of]
+            rms = [f"{summary.rms_position_cm:.2f} cm, {summary.rms_theta_deg:.2f}\u00b0" for summary in of]
             rows.append((f"{pair[0].name} {rms_name(pair[0].errors)}", rms))
             rows.append((f"{pair[0].name} settling", [settling_text(robot.errors) for robot in pair]))
     for robot in tracks[0].robots:
         last = [only_robots(side.periods[-1:], [robot.id])[0].robots[0] for side in sides]
         counts = [
             " / ".join(
-                "?" if count is None else f"{count}" for count in (one.accepted, one.rejected, one.stale)
+                "?" if count is None else f"{count}"
+                for count in (robot.accepted, robot.rejected, robot.stale)
             )
-            for one in last
+            for robot in last
         ]
         rows.append((f"{robot.name} frames accepted / rejected / stale", counts))
     return rows

@@ -51,16 +51,20 @@ def pair_figures(first: PageTracks, other: PageTracks, marked: Sequence[int]) ->
     made: Figures = {}
     robots = [*first.robots, *other.robots]
     if any(robot.steered for robot in robots):
-        made["plot-position"] = curves("position error [cm]", lambda one: position_of(one.errors), LEAST_CM)
-        made["plot-heading"] = curves("heading error [rad]", lambda one: heading_of(one.errors), LEAST_RAD_S)
+        made["plot-position"] = curves(
+            "position error [cm]", lambda track: position_of(track.errors), LEAST_CM
+        )
+        made["plot-heading"] = curves(
+            "heading error [rad]", lambda track: heading_of(track.errors), LEAST_RAD_S
+        )
     made["plot-apart"] = _apart(first, other, times)
     if any(value == value for value in chain.from_iterable(robot.told_v_m_s for robot in robots)):
-        made["plot-told-v"] = curves("v [m/s]", lambda one: one.told_v_m_s, LEAST_M_S, mode="after")
+        made["plot-told-v"] = curves("v [m/s]", lambda track: track.told_v_m_s, LEAST_M_S, mode="after")
         made["plot-told-w"] = curves(
-            "\u03c9 [rad/s]", lambda one: one.told_w_rad_s, LEAST_RAD_S, mode="after"
+            "\u03c9 [rad/s]", lambda track: track.told_w_rad_s, LEAST_RAD_S, mode="after"
         )
-    made["plot-v"] = curves("v [m/s]", lambda one: one.v_m_s, LEAST_M_S)
-    made["plot-w"] = curves("\u03c9 [rad/s]", lambda one: one.w_rad_s, LEAST_RAD_S)
+    made["plot-v"] = curves("v [m/s]", lambda track: track.v_m_s, LEAST_M_S)
+    made["plot-w"] = curves("\u03c9 [rad/s]", lambda track: track.w_rad_s, LEAST_RAD_S)
     for side in SIDES:
         profile = partial(_profile, side)
         made[f"plot-{side}"] = curves(f"{side} [m/s]", profile, LEAST_M_S)
@@ -79,10 +83,10 @@ def _apart(first: PageTracks, other: PageTracks, times: Any) -> Any:
     """The distance between both places of each robot, as long as both runs go."""
     made = panel("distance [cm]", times, x_label="t [s]")
     shorter = min(first, other, key=lambda tracks: len(tracks.ticks))
-    for number, (one, twin) in enumerate(zip(first.robots, other.robots, strict=True)):
+    for number, (robot, twin) in enumerate(zip(first.robots, other.robots, strict=True)):
         count = len(shorter.ticks)
-        x_m = np.array(one.truth.x_m[:count]) - np.array(twin.truth.x_m[:count])
-        y_m = np.array(one.truth.y_m[:count]) - np.array(twin.truth.y_m[:count])
+        x_m = np.array(robot.truth.x_m[:count]) - np.array(twin.truth.x_m[:count])
+        y_m = np.array(robot.truth.y_m[:count]) - np.array(twin.truth.y_m[:count])
         source = ColumnDataSource(
             {"t": seconds_at(shorter.ticks), "value": 100.0 * np.sqrt(x_m * x_m + y_m * y_m)}
         )

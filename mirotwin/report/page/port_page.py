@@ -51,8 +51,12 @@ def port_page(job: Job, quiet: bool) -> bytes:
 
 def _marks(differences: Sequence[Difference], slot: int, channel: str) -> list[float]:
     """When robot and twin part in the channel."""
-    parted = [one for one in differences if one.slot == slot and one.channel in ("answer", channel)]
-    return list(dict.fromkeys(seconds(one.tick) for one in parted))[:FIRST]
+    parted = [
+        difference
+        for difference in differences
+        if difference.slot == slot and difference.channel in ("answer", channel)
+    ]
+    return list(dict.fromkeys(seconds(difference.tick) for difference in parted))[:FIRST]
 
 
 def _figure(pairs: Sequence[Pair], channel: str, end_s: float, marks: list[float]) -> Any:
@@ -74,7 +78,7 @@ def _course(answers: Sequence[LogEntry], channel: str) -> list[int]:
     """The channel from answer to answer: what went on is added up."""
     take, _ = FIELDS[channel]
     if channel == "flags":
-        return [int(one.said.flags) for one in answers]
-    return list(accumulate((take(one.said, other.said) for one, other in pairwise(answers)), initial=0))[
-        : len(answers)
-    ]
+        return [int(answer.said.flags) for answer in answers]
+    return list(
+        accumulate((take(answer.said, other.said) for answer, other in pairwise(answers)), initial=0)
+    )[: len(answers)]

@@ -73,7 +73,10 @@ def run_page(material: Material) -> bytes:
     tracks = tracks_of(material.periods, steered, delay_frames)
     add_samples(tracks, material.extras.samples)
     marks = [mark for mark in again.marks if tracks.shows(mark.start_tick)]
-    ticks = [*(one.tick for one in again.result.failures), *(fault.tick for _, _, fault in again.faults)]
+    ticks = [
+        *(failure.tick for failure in again.result.failures),
+        *(fault.tick for _, _, fault in again.faults),
+    ]
     figures = figures_of(tracks, marks, list(filter(tracks.shows, ticks)))
     kinds = {mark.kind for mark in marks}
     seen = any(steered) or bool(material.extras.frames)  # else nobody looks at what the camera measured
@@ -87,7 +90,9 @@ def run_page(material: Material) -> bytes:
         "seen": seen,
         "pitch_shows": "where each robot is, should be and was seen",
         "kinds": [(kind, colour) for kind, colour in KIND_COLOURS.items() if kind in kinds],
-        "lanes": [(lane, Counter(one.kind for one in marks if one.lane == lane)) for lane in lanes_of(marks)],
+        "lanes": [
+            (lane, Counter(mark.kind for mark in marks if mark.lane == lane)) for lane in lanes_of(marks)
+        ],
     }
     return render("run.html", figures, page_data(tracks, marks, material.extras.frames, ticks), values)
 
@@ -104,7 +109,7 @@ def shared(material: Material, clock: int) -> dict[str, Any]:
         "scenario": material.job.spec.scenario,
         "firmware": material.job.spec.image.path.name,
         "verdict": _verdict(material),
-        "interrupts": [one for one in again.profile.interrupts if one.count],
+        "interrupts": [interrupt for interrupt in again.profile.interrupts if interrupt.count],
         "coverage": coverage_rows(again.image, again.counts, material.sources),
         "channels": first_per_channel(material.differences),
     }
@@ -175,7 +180,7 @@ def _verdict(material: Material) -> tuple[str, str]:
     """A word for the badge, and how many checks it comes from."""
     again, steps = material.again, material.steps
     verdicts = [*again.result.expectations, *(steps.expectations if steps else ())]
-    failed = [one for one in verdicts if one.verdict == "failed"]
+    failed = [verdict for verdict in verdicts if verdict.verdict == "failed"]
     count = amount(len(verdicts), "check")
     of = f"{len(failed)} of {count} failed" if failed else count
     if material.verdict and not again.faults:
@@ -184,7 +189,10 @@ def _verdict(material: Material) -> tuple[str, str]:
     if again.faults:
         parts.append("fault")
     if steps is not None:
-        parts += ["failed" if steps.failed else "passed", *(one.verdict for one in steps.expectations)]
+        parts += [
+            "failed" if steps.failed else "passed",
+            *(verdict.verdict for verdict in steps.expectations),
+        ]
     verdict = judge(parts)
     if material.extras.broken_off and verdict not in ("fault", "failed"):
         return "broken off", of
@@ -236,10 +244,10 @@ def page_data(
             "lanes": lanes,
             "kinds": kinds,
             "marks": [
-                (one.start_tick, one.end_tick, lanes.index(one.lane), kinds.index(one.kind), one.text)
-                for one in sorted(marks, key=lambda mark: mark.start_tick)
+                (mark.start_tick, mark.end_tick, lanes.index(mark.lane), kinds.index(mark.kind), mark.text)
+                for mark in sorted(marks, key=lambda mark: mark.start_tick)
             ],
-            "frames": [(one.network, one.tick, one.jpeg) for one in frames],
+            "frames": [(frame.network, frame.tick, frame.jpeg) for frame in frames],
         }
     )
 
@@ -258,7 +266,7 @@ def _robot(robot: PageTrack, count: int) -> dict[str, Any]:
 
 
 def _packed(postures: Postures, count: int) -> list[str]:
-    return [_base64(one, count) for one in (postures.x_m, postures.y_m, postures.theta_rad)]
+    return [_base64(column, count) for column in (postures.x_m, postures.y_m, postures.theta_rad)]
 
 
 def _base64(numbers: Column, count: int) -> str:

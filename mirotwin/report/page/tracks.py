@@ -22,7 +22,9 @@ M_S_PER_COUNT = UNITS_PER_COUNT / Wheels().units_per_m_s
 """Wheel speed of one count per sample, of a wheel with the nominal radius."""
 _VELOCITY_SCALE = M_S_PER_COUNT / 65536.0
 _PERIOD_SAMPLES = CONTROL_PERIOD_TICKS / LM629_SAMPLE_TICKS
-_SETS_POSITION = frozenset(opcode for opcode, one in BY_OPCODE.items() if one.name in ("RESET", "DFH"))
+_SETS_POSITION = frozenset(
+    opcode for opcode, command in BY_OPCODE.items() if command.name in ("RESET", "DFH")
+)
 _WRAP = 1 << 32
 
 

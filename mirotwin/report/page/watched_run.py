@@ -69,7 +69,9 @@ def run_again(job: Job, until_tick: int | None, quiet: bool) -> WatchedRun:
         result=again.result(),
         periods=again.periods,
         digest=world.digest,
-        faults=[(robot.network, robot.slot, one) for robot in world.devices for one in robot.board.faults],
+        faults=[
+            (robot.network, robot.slot, fault) for robot in world.devices for fault in robot.board.faults
+        ],
         marks=log.marks(),
         image=image,
         robot=f"net{device.network}/robot{device.slot}" if watch is None else spec.scenario.name,

@@ -62,7 +62,7 @@ class Trace:
         if self.world.in_period:
             for line in self.world.lines:
                 items += [*line.sent, *line.actions.done]
-        return tuple(sorted(items, key=lambda one: one.tick))
+        return tuple(sorted(items, key=lambda item: item.tick))
 
     def __repr__(self) -> str:
         return f"Trace({len(self._happened)} actions and transmissions up to tick {self.world.tick})"
@@ -102,7 +102,7 @@ def case_text(
 
 
 def _is_bare(scenario: BoardScenario) -> bool:
-    """Whether it is the processor with external RAM, and nothing on it."""
+    """True if it is the processor with external RAM, and nothing on it."""
     board = scenario.board
     bare = BoardSpec(
         name=board.name,
@@ -130,7 +130,7 @@ def stream_text(
     if verdict:
         header["verdict"] = one_line(verdict)
     text = tomli_w.dumps({**header, **more}).rstrip("\n")
-    return stream.format_stream([stream.Entry(one) for one in script], stream_header.of_text(text))
+    return stream.format_stream([stream.Entry(item) for item in script], stream_header.of_text(text))
 
 
 def tables_of(scenario: Scenario) -> dict[str, Any]:
@@ -179,7 +179,7 @@ def write_case(path: str | os.PathLike[str], text: str) -> None:
 
 
 def is_case(path: str | Path) -> bool:
-    """Whether a stream file expects something. One that cannot be read may: who runs it says what is wrong."""
+    """True if a stream file expects something. One that cannot be read may: who runs it says what is wrong."""
     if not has_header(path):
         return False
     try:
@@ -189,7 +189,7 @@ def is_case(path: str | Path) -> bool:
 
 
 def has_header(path: str | Path) -> bool:
-    """Whether a file is a stream that may say something of itself, as a case does."""
+    """True if a file is a stream that may say something of itself, as a case does."""
     if not Path(path).is_file():
         return False
     with open(path, "rb") as file:

@@ -190,7 +190,7 @@ class AliveMonitor(Monitor[ActsAtAll]):
 
     def _look_at_resets(self, record: RobotPeriod, now: int) -> None:
         """In the order of time. The board may have gone on: what it has done after `now` waits for the next look."""
-        due = [one for one in self.resets if one <= now]
+        due = [reset for reset in self.resets if reset <= now]
         del self.resets[: len(due)]
         commands = (*record.left.commands, *record.right.commands)
         turns = {tick for tick, opcode, _ in commands if opcode == _STT and tick > self.begun_tick}
@@ -204,7 +204,7 @@ class AliveMonitor(Monitor[ActsAtAll]):
     def _due(self, tick: int) -> list[Waiting]:
         """The frames that should have had their effect by now; `words` become those of the last one that is over."""
         self.words = next((words for end, _, words in reversed(self.waiting) if end <= tick), self.words)
-        due = [one for one in self.waiting if one[0] + self.acting_ticks <= tick]
+        due = [entry for entry in self.waiting if entry[0] + self.acting_ticks <= tick]
         del self.waiting[: len(due)]
         return due
 

@@ -89,10 +89,12 @@ def named_in(scenario: Scenario | BoardScenario) -> set[str]:
 
 
 def says_anything(scenario: Scenario | BoardScenario) -> bool:
-    """Whether a scenario expects more than what every run has to fulfil."""
+    """True if a scenario expects more than what every run has to fulfil."""
     if isinstance(scenario, BoardScenario):
         return bool(scenario.expect)
-    return bool(scenario.expect or any(robot.expect for one in scenario.networks for robot in one.robot))
+    return bool(
+        scenario.expect or any(robot.expect for network in scenario.networks for robot in network.robot)
+    )
 
 
 def checks_of_table(
@@ -185,8 +187,8 @@ def _takes_a_table(struct: type[Check], name: str) -> tuple[str, str]:
     info = cast(msgspec.inspect.StructType, msgspec.inspect.type_info(struct))
     for field in info.fields:
         if field.required and isinstance(field.type, msgspec.inspect.UnionType):
-            kinds = [one for one in field.type.types if isinstance(one, msgspec.inspect.StructType)]
-            remedy += f"; {kinds[0].tag_field}: {', '.join(str(one.tag) for one in kinds)}"
+            kinds = [option for option in field.type.types if isinstance(option, msgspec.inspect.StructType)]
+            remedy += f"; {kinds[0].tag_field}: {', '.join(str(option.tag) for option in kinds)}"
     return f"{name} takes a table", remedy
 
 

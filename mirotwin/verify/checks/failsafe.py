@@ -37,7 +37,7 @@ class SilenceCheck(Check, frozen=True, kw_only=True):
         return SilenceMonitor(self, subject)
 
     def fulfilled(self, order: Order) -> bool:
-        """Whether a wheel under this order is as it has to be after that time."""
+        """True if a wheel under this order is as it has to be after that time."""
         raise NotImplementedError
 
 

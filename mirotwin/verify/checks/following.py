@@ -63,8 +63,8 @@ class Following:
             try:
                 self.follower = condition.follower(name, 0, self.clock, now, value)
             except ValueError as error:  # a text is no number
-                what, _, remedy = f"{error}".partition("; ")
-                raise PluginError(what, remedy) from None
+                problem, _, remedy = f"{error}".partition("; ")
+                raise PluginError(problem, remedy) from None
 
     def heard(self, event: Event) -> None:
         self.text.append((event.tick, 0, event.value))
@@ -80,11 +80,11 @@ class Following:
             return [match for match in follower.feed(text, tick) if match[0] >= self.begin_tick]
         if isinstance(condition, Value):
             assert isinstance(follower, ValueFollower)
-            found = follower.feed(self._new(self.changes.values, tick + 1), tick)
-            early = [match for match in found if match[0] < self.begin_tick]
-            if early and follower.fitted and len(early) == len(found):
+            matches = follower.feed(self._new(self.changes.values, tick + 1), tick)
+            early = [match for match in matches if match[0] < self.begin_tick]
+            if early and follower.fitted and len(early) == len(matches):
                 return [(self.begin_tick, follower.last)]
-            return found[len(early) :]
+            return matches[len(early) :]
         assert isinstance(condition, OfPin)
         if follower is None:
             level, self.serial = self.changes.level_before(self.place.net, self.begin_tick)

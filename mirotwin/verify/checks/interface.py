@@ -117,7 +117,7 @@ class Subject(msgspec.Struct, frozen=True):
 
     @property
     def alone(self) -> bool:
-        """Whether it is a board alone."""
+        """True if it is a board alone."""
         return not isinstance(self.device, Robot)
 
     @property

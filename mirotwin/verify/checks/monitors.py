@@ -97,7 +97,9 @@ class Checks:
             for device in line.devices
         ]
         self._each(_DeviceMonitors.begin)
-        self.at_ends = [(one, monitor) for one in self.devices for monitor in one.that_have("period_over")]
+        self.at_ends = [
+            (robot, monitor) for robot in self.devices for monitor in robot.that_have("period_over")
+        ]
         self.finished = False
         self.index = world.index
         self.unreported: list[tuple[Period, int]] = []  # and where the world stood at their end
@@ -148,7 +150,7 @@ class Checks:
     @property
     def failures(self) -> list[Failure]:
         """All failures that were saved, in the order of time."""
-        return sorted((one for monitor in self.monitors for one in monitor.failures), key=_BY_TICK)
+        return sorted((failure for monitor in self.monitors for failure in monitor.failures), key=_BY_TICK)
 
     def check(self) -> None:
         """Raises ExpectationFailed if a check has failed."""
@@ -166,7 +168,7 @@ class Checks:
 
     @property
     def ended_early(self) -> bool:
-        """Whether who runs the world ended it: what was still to come counts neither for nor against it."""
+        """True if who runs the world ended it: what was still to come counts neither for nor against it."""
         return self.cut and self.world.tick < self.world.periods * self.world.period_ticks
 
     @property
@@ -176,12 +178,12 @@ class Checks:
 
     def verdict(self) -> Verdict:
         """Of all checks together. Those that are always on, and are named by nobody, need no occasion."""
-        faults = ["fault" for one in self.failures if one.fault]
+        faults = ["fault" for failure in self.failures if failure.fault]
         named = () if self.ended_early else self.named
         verdicts = self.verdicts()
         return judge(
-            [*faults, *(one.verdict for one in verdicts if one.name in named)],
-            (one.verdict for one in verdicts if one.name not in named),
+            [*faults, *(verdict.verdict for verdict in verdicts if verdict.name in named)],
+            (verdict.verdict for verdict in verdicts if verdict.name not in named),
         )
 
 
@@ -236,7 +238,11 @@ class _DeviceMonitors:
 
     def that_have(self, method: str) -> list[Monitor[Any]]:
         """The monitors with a method of their own; telling the others would cost time."""
-        return [one for one in self.monitors if getattr(type(one), method) is not getattr(Monitor, method)]
+        return [
+            monitor
+            for monitor in self.monitors
+            if getattr(type(monitor), method) is not getattr(Monitor, method)
+        ]
 
     def look(self, periods: Sequence[tuple[Period, int]]) -> None:
         """Tells the monitors of control periods, each with the first tick after it."""
@@ -330,15 +336,15 @@ LOST = "more events than the robot's log holds"
 
 
 def _verdict(name: str, monitors: Sequence[Monitor[Any]], lost: bool, reason: str) -> Expectation:
-    failed, judged = sum(one.failed for one in monitors), sum(one.judged for one in monitors)
+    failed, judged = sum(monitor.failed for monitor in monitors), sum(monitor.judged for monitor in monitors)
     verdict: Verdict = "failed" if failed else "passed"
     if not failed and judged == 0:
-        unseen = next((one.unseen for one in monitors if one.unseen), "")
-        missed = next((one.missed for one in monitors if one.missed), reason)
+        unseen = next((monitor.unseen for monitor in monitors if monitor.unseen), "")
+        missed = next((monitor.missed for monitor in monitors if monitor.missed), reason)
         verdict, reason = ("not observable", unseen) if unseen else ("not judged", missed)
     elif not failed and lost and any(monitor.EVENTS for monitor in monitors):
         verdict, reason = "not judged", LOST
-    failures = (one for monitor in monitors for one in monitor.failures)
+    failures = (failure for monitor in monitors for failure in monitor.failures)
     first = min(failures, key=_BY_TICK, default=None)
     return Expectation(
         name=name,

@@ -181,7 +181,7 @@ class ActsMonitor(OrdersMonitor[ActsCheck]):
                 self.rule.team(frame.last_tick, *words)
 
     def _stopping(self) -> bool:
-        """Whether both wheels have the order to stop, with their loops closed: velocity 0 changes nothing for them."""
+        """True if both wheels have the order to stop, with their loops closed: velocity 0 changes nothing for them."""
         return all(order.what != "off" and not order.moves for order in self.orders.last.values())
 
     def until(self, tick: int) -> None:

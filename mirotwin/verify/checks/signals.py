@@ -44,7 +44,7 @@ class PwmMonitor(Monitor[PwmAtLeast]):
     def __init__(self, check: PwmAtLeast, subject: Subject) -> None:
         super().__init__(check, subject)
         self._follow(subject.begin_tick)
-        self.unseen = next((one.unseen for one in self.periods.values()), "")
+        self.unseen = next((period.unseen for period in self.periods.values()), "")
 
     def _follow(self, begin_tick: int) -> None:
         off_hz = 1000.0 / self.check.off_after_ms
@@ -163,7 +163,7 @@ class LimitMonitor(Monitor[ValueAtMost]):
         super().__init__(check, subject)
         begin = subject.begin_tick
         self.values = {path: Following(beyond(check, path), subject, begin) for path in check.values}
-        self.unseen = next((one.unseen for one in self.values.values()), "")
+        self.unseen = next((limit.unseen for limit in self.values.values()), "")
         self.judged = 1
 
     def until(self, tick: int) -> None:

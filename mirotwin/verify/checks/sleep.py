@@ -1,4 +1,4 @@
-"""Whether firmware that sleeps when it has nothing to do sleeps again at the end of a run."""
+"""True if firmware that sleeps when it has nothing to do sleeps again at the end of a run."""
 
 from __future__ import annotations
 
@@ -35,12 +35,12 @@ class Sleep:
 
     @property
     def slept(self) -> bool:
-        """Whether it has slept since the second look."""
+        """True if it has slept since the second look."""
         return self.late_cycles >= 0 and self.cpu.idle_cycles > self.late_cycles
 
     @property
     def answers(self) -> bool:
-        """Whether firmware that sleeps in time is at something, or sends."""
+        """True if firmware that sleeps in time is at something, or sends."""
         cpu = self.cpu
         at_rest = cpu.powered_down or (cpu.idle and cpu.peripherals.uart.ti_tick() >= STOPPED_TICK)
         return bool(self.sleeps and self.slept and not at_rest)

@@ -67,7 +67,7 @@ class Step(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_only=True
 
     VERB: ClassVar[str] = ""
     CHANGES: ClassVar[bool] = True
-    """Whether later steps depend on this one."""
+    """True if later steps depend on this one."""
     NEEDS: ClassVar[Feature | None] = None
     """The feature of the machine that the step needs."""
     SUBJECTS: ClassVar[tuple[Kind, ...]] = BOTH
@@ -96,7 +96,7 @@ class Step(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_only=True
         return absent(getattr(self, "slot", None), network)
 
     def problem_alone(self, scenario: BoardScenario) -> str:
-        """The same with the board of a scenario."""
+        """Why it cannot be done with the board of a scenario, as `key: what; remedy`, or the empty string."""
         return ""
 
     def do(self, player: Player) -> None:

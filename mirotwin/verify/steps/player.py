@@ -375,7 +375,7 @@ def _meanwhile(earlier: Sequence[Event]) -> str:
     if not events:
         return "nothing happened meanwhile"
     counted = Counter(event.what for event in events)
-    parts = ", ".join(f"{count} {what}" for what, count in counted.items())
+    parts = ", ".join(f"{count} {kind}" for kind, count in counted.items())
     return f"only {parts}; the last: {events[-1]}"
 
 

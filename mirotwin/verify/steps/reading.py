@@ -114,9 +114,9 @@ class _Table:
         alone = isinstance(self.scenario, BoardScenario)
         if ("board" if alone else "robot") not in step.subjects:
             value = self.table[verb]
-            what = f"{verb} = {value!r}" if isinstance(value, str) and verb != "press" else verb
+            problem = f"{verb} = {value!r}" if isinstance(value, str) and verb != "press" else verb
             self.refuse(
-                verb, f"{what} is for {'robots' if alone else 'a board with parts'}", self.others(verb)
+                verb, f"{problem} is for {'robots' if alone else 'a board with parts'}", self.others(verb)
             )
 
     def others(self, verb: str) -> str:

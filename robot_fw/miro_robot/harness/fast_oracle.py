@@ -180,7 +180,7 @@ class FastOracle(LiveOracle):
             silence.last_tick = -1
 
     def _is_over(self, code: int, order: WheelOrder) -> bool:
-        """Whether a wheel is as it has to be in silence: stopped or off."""
+        """True if a wheel is as it has to be in silence: stopped or off."""
         return order.what == "off" if code == _OFF else not order.moves()
 
     # ---- what is received ----------------------------------------------------------------------------------
@@ -221,7 +221,7 @@ class FastOracle(LiveOracle):
                 self.decided = 0
 
     def _stops_already(self) -> bool:
-        """Whether velocity 0 is wanted, and both wheels are told so with their loops closed."""
+        """True if velocity 0 is wanted, and both wheels are told so with their loops closed."""
         if self.left_order.what == "off" or self.right_order.what == "off":
             return False
         told = self.left_order.moves() or self.right_order.moves()

@@ -65,7 +65,7 @@ class LiveOracle:
         """The machine has run to `tick`."""
 
     def waits(self) -> bool:
-        """Whether something is still to come, so that the run must not end."""
+        """True if something is still to come, so that the run must not end."""
         return False
 
 
@@ -238,7 +238,7 @@ class Harness:
         return len(_OPENING)
 
     def _opens(self, board: Board, program: Program) -> bool:
-        """Whether the program begins as all frames do, on a board with neither a probe nor an inspector."""
+        """True if the program begins as all frames do, on a board with neither a probe nor an inspector."""
         if board.probe is not None or self.cpu.inspector is not None or not program.opens_with(_OPENING):
             return False
         if self._opening_mask != self.cpu.edge_mask:
@@ -339,7 +339,7 @@ class Harness:
         return _DONE
 
     def _falls_asleep(self, until: int) -> bool:
-        """Whether it does before `until`; no longer than that."""
+        """True if it does before `until`; no longer than that."""
         cpu = self.cpu
         stopped = 0
         asleep = 0

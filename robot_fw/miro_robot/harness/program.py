@@ -149,11 +149,11 @@ class Program:
         return self.count
 
     def ends_with_reset(self) -> bool:
-        """Whether the reset pin goes up after the last character."""
+        """True if the reset pin goes up after the last character."""
         return self._flags & _RESET != 0
 
     def opens_with(self, characters: bytes) -> bool:
-        """Whether these come first, without a pause, a bad stop bit or a reset."""
+        """True if these come first, without a pause, a bad stop bit or a reset."""
         size = len(characters)
         if self.count < size:
             return False
@@ -262,7 +262,7 @@ class Program:
             self._pause(_PUT_TICKS)
 
     def _has_put(self) -> bool:
-        """Whether a value was put since the last character: a reset comes right after that one."""
+        """True if a value was put since the last character: a reset comes right after that one."""
         return self.puts > 0 and self.put_places[self.puts - 1] == self.count
 
     def _frame_operation(self, kind: int) -> None:

@@ -102,20 +102,20 @@ def values_in(kind: CType, fields: Fields, inside: tuple[str, ...] = ()) -> int:
     within itself, more than `MOST_BYTES` in all (of a union, members count that lie over each other).
     """
     if kind.kind == "array" and kind.element is not None:
-        found = kind.count * values_in(kind.element, fields, inside)
+        count = kind.count * values_in(kind.element, fields, inside)
     elif kind.kind == "struct":
         if kind.tag in inside or len(inside) >= _MOST_DEEP:
             return 0
-        found = 0
+        count = 0
         for field in fields.get(kind.tag, ()):
             more = values_in(field.type, fields, (*inside, kind.tag))
-            if not more or field.offset + field.type.size > kind.size or found > MOST_BYTES:
+            if not more or field.offset + field.type.size > kind.size or count > MOST_BYTES:
                 return 0
-            found += more
-        found = max(1, found)  # one that the file does not describe is empty
+            count += more
+        count = max(1, count)  # one that the file does not describe is empty
     else:
-        found = 1
-    return found if found <= MOST_BYTES else 0
+        count = 1
+    return count if count <= MOST_BYTES else 0
 
 
 def type_named(name: str) -> CType | None:
@@ -124,13 +124,13 @@ def type_named(name: str) -> CType | None:
         return CType("float", 4)
     if name == "bit":
         return CType("bit", 1)
-    found = _NAMED.fullmatch(name)
-    if found is None:
+    match = _NAMED.fullmatch(name)
+    if match is None:
         return None
-    number = CType("int", int(found[2]) // 8, signed=not found[1])
-    if found[3] is None:
+    number = CType("int", int(match[2]) // 8, signed=not match[1])
+    if match[3] is None:
         return number
-    return CType("array", number.size * int(found[3]), element=number, count=int(found[3]))
+    return CType("array", number.size * int(match[3]), element=number, count=int(match[3]))
 
 
 def value_of(kind: CType, data: bytes, fields: Fields) -> Any:
@@ -184,7 +184,7 @@ def _array_bytes(kind: CType, element: CType, value: Any, before: bytes, fields:
     size = element.size
     parts = [before[at * size : (at + 1) * size] for at in range(kind.count)]
     pairs = zip(value, parts, strict=True)
-    return b"".join(bytes_of(element, one, part, fields) for one, part in pairs)
+    return b"".join(bytes_of(element, each, part, fields) for each, part in pairs)
 
 
 def _struct_bytes(kind: CType, value: Any, before: bytes, fields: Fields) -> bytes:
@@ -192,8 +192,8 @@ def _struct_bytes(kind: CType, value: Any, before: bytes, fields: Fields) -> byt
     if not isinstance(value, Mapping) or not value.keys() <= members.keys():
         raise ValueError(f"{value!r} is no {kind}: its members are {', '.join(members)}")
     data = bytearray(before)
-    for name, one in value.items():
+    for name, each in value.items():
         field = members[name]
         place = slice(field.offset, field.offset + field.type.size)
-        data[place] = bytes_of(field.type, one, bytes(data[place]), fields)
+        data[place] = bytes_of(field.type, each, bytes(data[place]), fields)
     return bytes(data)

@@ -151,7 +151,9 @@ def _inside(folder: Path, file: str) -> Path | None:
     try:
         path = (folder / file).resolve()
         if not path.exists() and "/" not in file:  # Windows' linkers write names in another case
-            path = next((one.resolve() for one in folder.iterdir() if one.name.lower() == file.lower()), path)
+            path = next(
+                (entry.resolve() for entry in folder.iterdir() if entry.name.lower() == file.lower()), path
+            )
         there = path.is_relative_to(folder.resolve()) and path.is_file()
     except (OSError, ValueError, RuntimeError):  # a name that is too long, or has a NUL; a circle of links
         return None
@@ -167,9 +169,9 @@ def listings(image: Path, link_map: str) -> Iterator[Path]:
     for module in dict.fromkeys([*map_modules(link_map), image.stem]):
         ways = ((image.parent, _name(module)), (image.parent, module), (Path(), module))
         places = (_inside(folder, f"{name}.rst") for folder, name in ways)
-        found = next((path for path in places if path is not None), None)
-        if found is not None:
-            yield found
+        listing = next((path for path in places if path is not None), None)
+        if listing is not None:
+            yield listing
 
 
 NAMES = (".map", ".cdb")
@@ -178,14 +180,14 @@ NAMES = (".map", ".cdb")
 
 def debug_files(image: Path, stem: str) -> dict[str, Path]:
     """All files that name things in an image, by the names under which they belong to a copy of it, `stem`.ihx."""
-    found = {f"{stem}{suffix}": image.with_suffix(suffix) for suffix in NAMES}
+    files = {f"{stem}{suffix}": image.with_suffix(suffix) for suffix in NAMES}
     link_map = read_text(image.with_suffix(".map"))
     modules = set(map(_name, map_modules(link_map)))
     for path in listings(image, link_map):
-        found[path.name if path.stem in modules else f"{stem}.rst"] = path
-    found = {name: path for name, path in found.items() if path.is_file()}
-    keil = None if found else keil_map_path(image)
-    return found if keil is None else {f"{stem}.m51": keil}
+        files[path.name if path.stem in modules else f"{stem}.rst"] = path
+    files = {name: path for name, path in files.items() if path.is_file()}
+    keil = None if files else keil_map_path(image)
+    return files if keil is None else {f"{stem}.m51": keil}
 
 
 def _read_listing(path: Path, image: Image) -> Iterator[tuple[int, int, SourceLine | None]]:

@@ -1,4 +1,4 @@
-"""Whether the `.map` and `.cdb` beside an image were written with it, or belong to another one.
+"""Checks that the `.map` and `.cdb` beside an image belong to it and not to another one.
 
 A file that is only unusual must pass: images are filled up, merged with a boot loader, cut apart; symbols are
 absolute, mark the end of an area, or name data that has no bytes. So a file is refused on contradictions alone:
@@ -38,20 +38,20 @@ class Contradiction(msgspec.Struct, frozen=True):
 
 
 @lru_cache(_KEPT)
-def check_map(found: MapFile, code: bytes, loaded: bytes) -> Contradiction | None:
+def check_map(file: MapFile, code: bytes, loaded: bytes) -> Contradiction | None:
     """A map against an image. `code`: 64 KB; `loaded`: 1 for each address that the image has a byte for."""
     return (
-        _check_start_up(found.places, code, loaded)
-        or _check_places(found.places, loaded)
-        or _check_instructions(found.instructions, code, loaded)
-        or _check_functions(found.places, code, loaded)
+        _check_start_up(file.places, code, loaded)
+        or _check_places(file.places, loaded)
+        or _check_instructions(file.instructions, code, loaded)
+        or _check_functions(file.places, code, loaded)
     )
 
 
 @lru_cache(_KEPT)
-def check_cdb(found: CdbFile, code: bytes, loaded: bytes) -> Contradiction | None:
-    """The same for a debug file."""
-    return _check_instructions(found.instructions, code, loaded)
+def check_cdb(file: CdbFile, code: bytes, loaded: bytes) -> Contradiction | None:
+    """A debug file (`.cdb`) against an image; arguments as for `check_map`."""
+    return _check_instructions(file.instructions, code, loaded)
 
 
 def _check_start_up(places: Sequence[CodePlace], code: bytes, loaded: bytes) -> Contradiction | None:
@@ -104,7 +104,7 @@ def _check_functions(places: Sequence[CodePlace], code: bytes, loaded: bytes) ->
 
 
 def _runs_into(code: bytes, address: int) -> bool:
-    """Whether none of the instructions that may end in front of `address` goes elsewhere."""
+    """True if none of the instructions that may end in front of `address` goes elsewhere."""
     return all(
         LENGTH[code[address - size]] != size or goes_on(code[address - size])
         for size in (1, 2, 3)
@@ -113,7 +113,7 @@ def _runs_into(code: bytes, address: int) -> bool:
 
 
 def _is_reached(code: bytes, first: int, address: int) -> bool:
-    """Whether an instruction begins at `address`, going by those from `first` on."""
+    """True if an instruction begins at `address`, going by those from `first` on."""
     while first < address:
         first += LENGTH[code[first]]
     return first == address

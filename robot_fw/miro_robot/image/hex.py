@@ -51,11 +51,11 @@ class Image(msgspec.Struct, frozen=True):
 
     def merged(self, other: Image) -> Image:
         """Both as one program, called as this one. Raises ImageError where both have a byte at the same address."""
-        mine, theirs = ({at for one in image.used for at in range(*one)} for image in (self, other))
+        mine, theirs = ({at for span in image.used for at in range(*span)} for image in (self, other))
         both = mine & theirs
         if both:
-            what = f"has a byte at {min(both):#06x}, as {self.path.name} has"
-            raise ImageError(other.path, 0, what, "link one of them elsewhere")
+            problem = f"has a byte at {min(both):#06x}, as {self.path.name} has"
+            raise ImageError(other.path, 0, problem, "link one of them elsewhere")
         code, loaded = bytearray(self.code), bytearray(SPACE_BYTES)
         for first, end in other.used:
             code[first:end] = other.code[first:end]
@@ -76,8 +76,8 @@ class Image(msgspec.Struct, frozen=True):
             symbol = self.symbols.find(known)
             if symbol is not None and symbol.space == "code":
                 return symbol.address
-        code = [one for one, symbol in self.symbols.names.items() if symbol.space == "code"]
-        names = code if name.startswith("_") else [one.removeprefix("_") for one in code]
+        code = [label for label, symbol in self.symbols.names.items() if symbol.space == "code"]
+        names = code if name.startswith("_") else [label.removeprefix("_") for label in code]
         otherwise = (
             "see the map beside the image"
             if names
@@ -106,7 +106,7 @@ def load_hex(path: str | Path, limit: int = FLASH_BYTES) -> Image:
 def parse_hex(
     content: bytes, path: Path, limit: int = FLASH_BYTES, names: dict[str, tuple[int, str]] | None = None
 ) -> Image:
-    """The same from the file's content; `path` is for messages and symbols.
+    """Parses the content of an Intel HEX file; `path` is for messages and symbols. Raises ImageError.
 
     `names`: address and space of each name, instead of the files beside `path`.
     """
@@ -173,10 +173,10 @@ def _names_beside(path: Path, content: bytes, limit: int) -> dict[str, Symbol]:
     return keil.map_file.names
 
 
-def _refuse(beside: Path, found: Contradiction | None) -> None:
-    if found is not None:
+def _refuse(beside: Path, contradiction: Contradiction | None) -> None:
+    if contradiction is not None:
         remedy = "it belongs to another image: rebuild both together, or take it away"
-        raise ImageError(beside, found.line, found.reason, remedy)
+        raise ImageError(beside, contradiction.line, contradiction.reason, remedy)
 
 
 def _too_big(limit: int) -> str:

@@ -60,7 +60,7 @@ class KeilMap(msgspec.Struct, frozen=True, eq=False):
 
     def extents(self, name: str) -> list[tuple[int, int]]:
         """(first, end) of the segments whose names begin so."""
-        return [(one.first, one.end) for one in self.segments if one.name.startswith(name)]
+        return [(segment.first, segment.end) for segment in self.segments if segment.name.startswith(name)]
 
     def misses_start_up(self, code: bytes) -> str:
         """Why the map is not of this image: its reset leads elsewhere than to the start-up code. "" if it may be."""
@@ -83,8 +83,10 @@ def keil_map_path(image: Path) -> Path | None:
     """The map of an image: of its name, in any case, beside it or in `Listings` or `Objects` of the project."""
     names = (f"{image.stem}.m51".lower(), f"{image.stem}.map".lower())
     for folder in project_folders(image):
-        inner = [one for one in _entries(folder) if one.name.lower() in _BUILD_FOLDERS and one.is_dir()]
-        for path in [one for place in (folder, *inner) for one in _entries(place)]:
+        inner = [
+            entry for entry in _entries(folder) if entry.name.lower() in _BUILD_FOLDERS and entry.is_dir()
+        ]
+        for path in [entry for place in (folder, *inner) for entry in _entries(place)]:
             if path.name.lower() in names and path.is_file() and is_keil(read_text(path)):
                 return path
     return None
@@ -98,7 +100,7 @@ def _entries(folder: Path) -> list[Path]:
 
 
 def is_keil(text: str) -> bool:
-    """Whether a map is one of these, by its first line."""
+    """True if a map is one of these, by its first line."""
     return _HEAD.match(text) is not None
 
 
@@ -174,7 +176,7 @@ class _Reader:
     def finish(self) -> KeilMap:
         names = self.statics | self.publics
         code = sorted((symbol.address, name) for name, symbol in names.items() if symbol.space == "code")
-        placed = [one for one in (self.function_in(*each, code) for each in self.codes) if one is not None]
+        placed = [each for each in (self.function_in(*each, code) for each in self.codes) if each is not None]
         for place, _ in placed:
             names.setdefault(place.name, Symbol(place.address, "code"))
         begun = {symbol.address for symbol in names.values() if symbol.space == "code"}
@@ -208,7 +210,9 @@ class _Reader:
         begin, end = (bisect.bisect_left(code, (address,)) for address in (segment.first, segment.end))
         inside = [(at, name) for at, name in code[begin:end] if "?" not in name]
         unnamed = () if inside else ((self.begun.get((module, function), segment.first), function),)
-        own = next((one for one in (*inside, *unnamed) if one[1].upper() == function.upper()), None)
+        own = next(
+            (candidate for candidate in (*inside, *unnamed) if candidate[1].upper() == function.upper()), None
+        )
         return None if own is None else (CodePlace(segment.name, own[1], own[0], number), segment.end)
 
 

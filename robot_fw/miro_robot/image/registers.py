@@ -55,22 +55,24 @@ class Blocks(msgspec.Struct, frozen=True, eq=False):
 
     def of_function(self, name: str, module: str) -> list[LocalVariable]:
         """Those of a function; `module` tells static functions of the same name apart."""
-        own = [one for one in self.variables if one.function == name]
-        alike = len({one.module for one in own}) < 2
-        return own if alike else [one for one in own if one.module == module]
+        own = [variable for variable in self.variables if variable.function == name]
+        alike = len({variable.module for variable in own}) < 2
+        return own if alike else [variable for variable in own if variable.module == module]
 
     def parameters(self, own: list[LocalVariable], first: int, end: int) -> list[LocalVariable]:
         """Those of `own` that are parameters of a function: their block is the one before its body's."""
         begin, after = (bisect.bisect_left(self.places, (address, 0, 0)) for address in (first, end))
         bodies = [(address, block) for address, level, block in self.places[begin:after] if level <= 1]
         _, body = min(bodies, default=(0, 0))  # of a function of one line, only its end is recorded
-        return [one for one in own if one.level <= 1 and one.block < body]
+        return [variable for variable in own if variable.level <= 1 and variable.block < body]
 
     def visible(self, own: list[LocalVariable], first: int, address: int) -> list[LocalVariable]:
         """Those of `own`, in registers or on the stack, that the C of an instruction could name; inner ones first."""
         around = self._around(first, address)
-        seen = [one for one in own if one.level <= 1 or one.block in around]
-        return sorted((one for one in seen if one.storage in "RB"), key=lambda one: -one.level)
+        seen = [variable for variable in own if variable.level <= 1 or variable.block in around]
+        return sorted(
+            (variable for variable in seen if variable.storage in "RB"), key=lambda variable: -variable.level
+        )
 
     def _around(self, first: int, address: int) -> set[int]:
         """The blocks around an instruction: the one before with a lower level is the next outer one."""
@@ -79,13 +81,13 @@ class Blocks(msgspec.Struct, frozen=True, eq=False):
         if at < start:
             return set()
         _, level, block = self.places[at]
-        found = {block}
+        around = {block}
         opened = {(number, depth) for _, depth, number in self.places[start:] if number < block}
         for number, depth in sorted(opened, reverse=True):
             if depth < level:
-                found.add(number)
+                around.add(number)
                 level = depth
-        return found
+        return around
 
 
 @lru_cache(_KEPT)
@@ -93,15 +95,15 @@ def parse_blocks(text: str) -> Blocks:
     """From a debug file's text; records that are damaged or of an unknown type are left out."""
     variables, places, banks = [], [], {}
     for line in text.splitlines():
-        if found := _LOCAL.match(line):
-            kind = type_of(found[7], int(found[6]), found[8] == "S")
-            if kind is not None and not re.fullmatch(r"sloc[0-9]+", found[3]):
-                registers = tuple(found[11].split(",")) if found[11] else ()
+        if match := _LOCAL.match(line):
+            kind = type_of(match[7], int(match[6]), match[8] == "S")
+            if kind is not None and not re.fullmatch(r"sloc[0-9]+", match[3]):
+                registers = tuple(match[11].split(",")) if match[11] else ()
                 where = registers if len(registers) == kind.size else ()
-                level, block, offset = int(found[4]), int(found[5]), int(found[10])
+                level, block, offset = int(match[4]), int(match[5]), int(match[10])
                 variables.append(
                     LocalVariable(
-                        found[3], found[1] or "", found[2], level, block, kind, found[9], where, offset
+                        match[3], match[1] or "", match[2], level, block, kind, match[9], where, offset
                     )
                 )
         elif function := _FUNCTION.match(line):

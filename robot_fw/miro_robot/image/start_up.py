@@ -38,7 +38,7 @@ def stack_set_up(code: bytes, used: tuple[tuple[int, int], ...]) -> tuple[int, i
 
 
 def _written_elsewhere(code: bytes, used: tuple[tuple[int, int], ...], value: int) -> bool:
-    """Whether an instruction gives SP anything else, going by the instructions from the begin of each range on."""
+    """True if an instruction gives SP anything else, going by the instructions from the begin of each range on."""
     for first, end in used:
         address = first
         while address < end:

@@ -153,8 +153,8 @@ def map_overlays(text: str) -> list[tuple[int, int]]:
 
 
 def _extents(areas: re.Pattern[str], text: str) -> list[tuple[int, int]]:
-    found = dict.fromkeys(areas.findall(text))
-    return [(int(at, 16), int(at, 16) + int(size, 16)) for at, size in found if int(size, 16)]
+    spans = dict.fromkeys(areas.findall(text))
+    return [(int(at, 16), int(at, 16) + int(size, 16)) for at, size in spans if int(size, 16)]
 
 
 CDB_SPACES = {
@@ -182,21 +182,21 @@ def parse_cdb(text: str) -> CdbFile:
             if symbol and symbol[3] in CDB_SPACES:
                 spaces[_scope(symbol[1])] = CDB_SPACES[symbol[3]]
         elif line.startswith("L:A$"):
-            if (found := _CDB_INSTRUCTION.match(line)) and (address := int(found[1], 16)) < _SPACE:
+            if (match := _CDB_INSTRUCTION.match(line)) and (address := int(match[1], 16)) < _SPACE:
                 instructions.setdefault(address, number)
         elif line.startswith("L:C$"):
-            if (found := _CDB_LINE.match(line)) and (address := int(found[3], 16)) < _SPACE:
-                lines.append((address, SourceLine(found[1], int(found[2]))))
-        elif line.startswith("L:") and (found := _CDB_NAME.match(line)):
-            scope, address = (found[2], found[3]), int(found[4], 16)
+            if (match := _CDB_LINE.match(line)) and (address := int(match[3], 16)) < _SPACE:
+                lines.append((address, SourceLine(match[1], int(match[2]))))
+        elif line.startswith("L:") and (match := _CDB_NAME.match(line)):
+            scope, address = (match[2], match[3]), int(match[4], 16)
             if address >= _SPACE:
                 continue
-            if found[1]:
+            if match[1]:
                 ends.append((scope, address))
                 continue
             begins[scope] = address
             if scope in spaces:
-                names["_" + found[3]] = Symbol(address, spaces[scope])
+                names["_" + match[3]] = Symbol(address, spaces[scope])
     return CdbFile(names, tuple(sorted(instructions.items())), tuple(lines), begins, tuple(ends))
 
 
@@ -213,15 +213,15 @@ _RST_CODE = re.compile(r"^ {6}([0-9A-F]{6})((?: [0-9A-F]{2})+) +(\[\d+\])?")
 @lru_cache(_KEPT)
 def parse_listing(text: str) -> tuple[ListedCode, ...]:
     """A relinked listing: the bytes of each of its lines, with the C line that a comment above names."""
-    found: list[ListedCode] = []
+    listed: list[ListedCode] = []
     line = None
     for number, row in enumerate(text.splitlines(), start=1):
         if named := _RST_LINE.match(row):
             line = SourceLine(named[1], int(named[2]))
         elif code := _RST_CODE.match(row):
             data = bytes.fromhex(code[2])
-            found.append(ListedCode(number, int(code[1], 16), data, line, bool(code[3])))
-    return tuple(found)
+            listed.append(ListedCode(number, int(code[1], 16), data, line, bool(code[3])))
+    return tuple(listed)
 
 
 _BIT_CODES = b"\x10\x20\x30\x72\x82\x92\xa0\xa2\xb0\xb2\xc2\xd2"  # their second byte is the address of a bit
@@ -231,11 +231,11 @@ _RST_BIT = re.compile(r"^ {6}[0-9A-F]{6} ([0-9A-F]{2}) ([0-9A-F]{2}).*\t\w+\t(?:
 @lru_cache(_KEPT)
 def parse_bits(text: str) -> dict[str, frozenset[int]]:
     """Addresses of the bits that instructions of a relinked listing name: SDCC's linker writes them nowhere else."""
-    found: dict[str, frozenset[int]] = {}
+    bits: dict[str, frozenset[int]] = {}
     for row in text.splitlines():
         if (code := _RST_BIT.match(row)) and int(code[1], 16) in _BIT_CODES:
-            found[code[3]] = found.get(code[3], frozenset()) | {int(code[2], 16)}
-    return found
+            bits[code[3]] = bits.get(code[3], frozenset()) | {int(code[2], 16)}
+    return bits
 
 
 STACK = "__start__stack"
@@ -260,7 +260,7 @@ class Symbols:
         self._set_up = set_up
 
     def with_stack(self, start: int) -> Symbols:
-        """The same names with a stack from that address of internal RAM to FFh."""
+        """A copy whose stack reaches from that address of internal RAM to FFh."""
         return Symbols(lambda: {**self.names, STACK: Symbol(start, "iram")}, self._used)
 
     @cached_property
@@ -292,7 +292,7 @@ class Symbols:
         if start is None or start.space != "iram":
             set_up = self._set_up()
             return (0, 0xFF) if set_up is None else (set_up[1] + 1, 0xFF)
-        in_ram = [one.address for one in self.names.values() if one.space == "iram"]
+        in_ram = [symbol.address for symbol in self.names.values() if symbol.space == "iram"]
         return start.address, min([*(at for at in in_ram if at > start.address), 0x100]) - 1
 
     @property

@@ -63,7 +63,7 @@ def parse_variables(text: str) -> Variables:
     """Those of a debug file's text; records that are damaged or of an unknown type are left out."""
     declared: dict[tuple[str, str, str], tuple[CType, str, str]] = {}
     structs: dict[str, dict[str, tuple[Member, ...]]] = {}
-    found: dict[str, dict[str, Variable]] = {}
+    scopes: dict[str, dict[str, Variable]] = {}
     module = ""
     for line in text.splitlines():
         if line.startswith("M:"):
@@ -82,15 +82,19 @@ def parse_variables(text: str) -> Variables:
                 scope = _scope(record[1])
                 local = record[1][0] == "L"
                 variable = Variable(record[2], scope, address, space, kind, where, local)
-                found.setdefault(record[2], {})[scope] = variable
+                scopes.setdefault(record[2], {})[scope] = variable
     bits = {
         (name, _scope(where)): Variable(name, _scope(where), -1, space, kind, module)
         for (where, name, _), (kind, space, module) in declared.items()
-        if space == "bit" and _scope(where) not in found.get(name, {})
+        if space == "bit" and _scope(where) not in scopes.get(name, {})
     }
     by_name = {}
-    for name, each in found.items():
-        sound = [one for one in each.values() if values_in(one.type, structs.get(one.module, {}))]
+    for name, each in scopes.items():
+        sound = [
+            variable_
+            for variable_ in each.values()
+            if values_in(variable_.type, structs.get(variable_.module, {}))
+        ]
         if sound:
             by_name[name] = tuple(sound)
     return Variables(by_name, structs, tuple(bits.values()))
@@ -114,19 +118,19 @@ def variables_of(image: Image) -> Variables:
     Where a bit lies is taken from the instructions in the listings.
     """
     _ = image.symbols.names  # compares the files with the image
-    found = parse_variables(read_text(image.path.with_suffix(".cdb")))
-    if not found.unplaced:
-        return found
+    parsed = parse_variables(read_text(image.path.with_suffix(".cdb")))
+    if not parsed.unplaced:
+        return parsed
     link_map = read_text(image.path.with_suffix(".map"))
     texts = {path.stem: read_text(path) for path in listings(image.path, link_map)}
-    by_name = dict(found.by_name)
-    for bit in found.unplaced:
+    by_name = dict(parsed.by_name)
+    for bit in parsed.unplaced:
         own = [texts[bit.module]] if bit.scope and bit.module in texts else list(texts.values())
         places = {address for text in own for address in parse_bits(text).get(f"_{bit.name}", ())}
         if len(places) == 1:
             placed = msgspec.structs.replace(bit, address=places.pop())
             by_name[bit.name] = (*by_name.get(bit.name, ()), placed)
-    return msgspec.structs.replace(found, by_name=by_name, unplaced=())
+    return msgspec.structs.replace(parsed, by_name=by_name, unplaced=())
 
 
 def find_variable(image: Image, name: str, as_type: str = "") -> tuple[Variable, Variables]:
@@ -140,26 +144,26 @@ def find_variable(image: Image, name: str, as_type: str = "") -> tuple[Variable,
             image.path, name, "is no name of a variable", "write name, file:name, name[2] or name.x"
         )
     scope, plain, steps = parts[1] or "", parts[2], parts[3]
-    found = _named(image, variables, scope, plain, as_type)
+    variable = _named(image, variables, scope, plain, as_type)
     for step in _STEP.finditer(steps):
-        found = _inside(image, variables, name, found, step[1], step[2])
+        variable = _inside(image, variables, name, variable, step[1], step[2])
     if as_type:
         kind = type_named(as_type)
         if kind is None:
             raise BadInput(
                 image.path, name, f"{as_type!r} is no type", "give int16, uint8[4], float, bit, .."
             )
-        found = msgspec.structs.replace(found, type=kind)
-    return found, variables
+        variable = msgspec.structs.replace(variable, type=kind)
+    return variable, variables
 
 
 def _named(image: Image, variables: Variables, scope: str, plain: str, as_type: str) -> Variable:
     there = variables.by_name.get(plain) or variables.by_name.get(plain.removeprefix("_"), ())
-    fitting = [one for one in there if not scope or scope in (one.scope, one.module)]
+    fitting = [variable for variable in there if not scope or scope in (variable.scope, variable.module)]
     if len(fitting) == 1:
         return fitting[0]
     if fitting:
-        choices = ", ".join(f"{one.scope or one.module}:{plain}" for one in fitting)
+        choices = ", ".join(f"{variable.scope or variable.module}:{plain}" for variable in fitting)
         raise BadInput(image.path, plain, "there are several of this name", f"give one of {choices}")
     symbol = image.symbols.find(plain)
     if symbol is not None and symbol.space != "code" and as_type and not scope:
@@ -171,7 +175,7 @@ def _named(image: Image, variables: Variables, scope: str, plain: str, as_type: 
         raise BadInput(image.path, plain, "is code, no variable", "give a variable's name")
     known = variables.by_name.items()
     names = [name for name, each in known if each[0].scope or each[0].space not in ("sfr", "bit")]
-    names += [name.removeprefix("_") for name, one in image.symbols.names.items() if one.space == "iram"]
+    names += [name.removeprefix("_") for name, each in image.symbols.names.items() if each.space == "iram"]
     near = did_you_mean(plain, names) or did_you_mean(plain, variables.by_name)
     remedy = near or "its .map and .cdb list the names"
     where = f"{scope}:{plain}" if scope else plain
@@ -179,15 +183,17 @@ def _named(image: Image, variables: Variables, scope: str, plain: str, as_type: 
 
 
 def _inside(
-    image: Image, variables: Variables, name: str, found: Variable, member: str | None, index: str | None
+    image: Image, variables: Variables, name: str, variable: Variable, member: str | None, index: str | None
 ) -> Variable:
     """A member or an element of a variable."""
-    kind = found.type
+    kind = variable.type
     if member is not None:
-        fields = variables.fields(found).get(kind.tag, ()) if kind.kind == "struct" else ()
+        fields = variables.fields(variable).get(kind.tag, ()) if kind.kind == "struct" else ()
         for field in fields:
             if field.name == member:
-                return msgspec.structs.replace(found, address=found.address + field.offset, type=field.type)
+                return msgspec.structs.replace(
+                    variable, address=variable.address + field.offset, type=field.type
+                )
         has = f"; it has {', '.join(field.name for field in fields)}" if fields else ""
         raise BadInput(image.path, name, f"{kind} has no member {member}{has}")
     at = int(index or 0)
@@ -195,4 +201,6 @@ def _inside(
         raise BadInput(image.path, name, f"{kind} is no array")
     if at >= kind.count:
         raise BadInput(image.path, name, f"{at} is after the end of {kind}", f"give 0 to {kind.count - 1}")
-    return msgspec.structs.replace(found, address=found.address + at * kind.element.size, type=kind.element)
+    return msgspec.structs.replace(
+        variable, address=variable.address + at * kind.element.size, type=kind.element
+    )

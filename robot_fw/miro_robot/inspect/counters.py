@@ -76,7 +76,7 @@ class InterruptProfile(msgspec.Struct):
 
     @property
     def never_left(self) -> bool:
-        """Whether the routine that is under way takes longer than any that came to its end."""
+        """True if the routine that is under way takes longer than any that came to its end."""
         return self.unfinished_cycles > self.worst_duration
 
 

@@ -61,17 +61,17 @@ def instruction_share(image: Image, debug: DebugInfo, counts: Counts) -> Share:
 
 def by_line(image: Image, debug: DebugInfo, counts: Counts) -> Tracefile:
     """Coverage of the C lines, by the file names that the compiler was given."""
-    found: Tracefile = {}
+    tracefile: Tracefile = {}
     for row in instructions(image, debug, counts):
         line = debug.line_at(row.address)
         if line is not None:
-            _count(found.setdefault(line.file, FileRecord()), line.line, row, counts)
+            _count(tracefile.setdefault(line.file, FileRecord()), line.line, row, counts)
     for function in debug.functions:
         line = function.line or debug.line_at(function.first)
         if line is not None:
             executed = counts.get(function.first, (0, 0))[0]
-            found.setdefault(line.file, FileRecord()).functions[function.name] = (line.line, executed)
-    return found
+            tracefile.setdefault(line.file, FileRecord()).functions[function.name] = (line.line, executed)
+    return tracefile
 
 
 def by_listing(image: Image, counts: Counts) -> tuple[str, FileRecord]:
@@ -99,7 +99,7 @@ def _count(record: FileRecord, line: int, row: ListingRow, counts: Counts) -> No
 
 
 def at_paths(tracefile: Tracefile, sources: Sources, here: Path) -> Tracefile:
-    """The same with files where they were found: relative to `here` if they are below it."""
+    """A copy with the paths where the files are: relative to `here` if they are below it."""
     return {_shown(file, sources, here): record for file, record in tracefile.items()}
 
 
@@ -113,12 +113,14 @@ def _shown(file: str, sources: Sources, here: Path) -> str:
 
 def line_share(tracefile: Tracefile) -> Share:
     records = tracefile.values()
-    return Share(sum(one.lines_hit for one in records), sum(len(one.lines) for one in records))
+    return Share(sum(record.lines_hit for record in records), sum(len(record.lines) for record in records))
 
 
 def branch_share(tracefile: Tracefile) -> Share:
     records = tracefile.values()
-    return Share(sum(one.branches_hit for one in records), sum(len(one.branches) for one in records))
+    return Share(
+        sum(record.branches_hit for record in records), sum(len(record.branches) for record in records)
+    )
 
 
 def missed(record: FileRecord) -> str:

@@ -59,8 +59,8 @@ def effect(code: bytes, address: int, bank: int) -> Effect:
         reads |= set(source)
         moves = tuple(zip(to, source, strict=False))
     elif mnemonic == "XCH" and words[1] != "@Ri":
-        one, other = to[0], places[words[1]][0]
-        writes, moves = {one, other}, ((one, other), (other, one))
+        here, other = to[0], places[words[1]][0]
+        writes, moves = {here, other}, ((here, other), (other, here))
     through = "".join(word for word in words if "@" in word)
     reads |= {bank + (opcode & 1)} if "Ri" in through else {DPL, DPH} if "DPTR" in through else set()
     reads |= {A} if "A+" in through else set()
@@ -85,15 +85,15 @@ class Callees:
     def _own(self, entry: int, bank: int) -> tuple[set[int], list[int]]:
         """What it writes itself, and whom it calls."""
         if (entry, bank) not in self._known:
-            code, found, called = self.reader.code, set[int](), []
+            code, written, called = self.reader.code, set[int](), []
             reached = self.reader.heights(entry)
             if not reached or any(code[address] == JMP_TABLE for address in reached):
-                found |= set(places_of(bank))
+                written |= set(places_of(bank))
             for address in reached:
-                found |= effect(code, address, bank).writes
+                written |= effect(code, address, bank).writes
                 to = target(code, address) if is_call(code[address]) else None
                 called += [] if to is None else [to]
-            self._known[entry, bank] = found, called
+            self._known[entry, bank] = written, called
         return self._known[entry, bank]
 
 
@@ -149,7 +149,7 @@ class Flow:
                 held = {place: _either(old[place], held[place]) for place in self.places}
                 depth = min(len(old_stack), len(stack))  # their tops are alike
                 pairs = zip(old_stack[len(old_stack) - depth :], stack[len(stack) - depth :], strict=True)
-                stack = tuple(_either(one, other) for one, other in pairs)
+                stack = tuple(_either(here, other) for here, other in pairs)
                 if (held, stack) == (old, old_stack):
                     continue
             known[address] = held, stack
@@ -185,24 +185,24 @@ class Flow:
             address = waiting.pop()
             does = self.effects[address]
             later = reduce(frozenset.union, (live[to] for to in self.after[address]), frozenset[int]())
-            found = does.reads | (later - does.writes)
-            if found != live[address]:
-                live[address] = found
+            needed = does.reads | (later - does.writes)
+            if needed != live[address]:
+                live[address] = needed
                 waiting += self.before[address]
         return live
 
 
 def _reached(first: Iterable[int], after: Callable[[int], Iterable[int]]) -> set[int]:
     """All places that one comes to from the first ones, these too."""
-    found, waiting = set[int](), [*first]
+    reached, waiting = set[int](), [*first]
     while waiting:
         place = waiting.pop()
-        if place not in found:
-            found.add(place)
+        if place not in reached:
+            reached.add(place)
             waiting += after(place)
-    return found
+    return reached
 
 
-def _either(one: frozenset[Origin], other: frozenset[Origin]) -> frozenset[Origin]:
-    both = one | other
+def _either(here: frozenset[Origin], other: frozenset[Origin]) -> frozenset[Origin]:
+    both = here | other
     return _ANY if len(both) > _MOST_ORIGINS or both >= _ANY else both

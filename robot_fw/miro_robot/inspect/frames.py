@@ -58,9 +58,9 @@ class Unwinder:
                 self._enter(first)
         self._enter_nameless(image.used)
         self.heights = {
-            address: found
+            address: height
             for address, ways in self._ways.items()
-            if (found := _agreed(ways, names.function(address)[0])) is not None
+            if (height := _agreed(ways, names.function(address)[0])) is not None
         }
 
     def _enter(self, entry: int) -> None:
@@ -77,7 +77,7 @@ class Unwinder:
                 waiting += [] if to is None else [to]
 
     def _enter_nameless(self, used: tuple[tuple[int, int], ...]) -> None:
-        """The same of functions of a library that only a pointer calls: each begins where another one ends."""
+        """Notes the heights of library functions that only a pointer calls: each begins where another ends."""
         waiting = sorted(self._ways)
         while waiting:
             address = waiting.pop()
@@ -99,20 +99,20 @@ class Unwinder:
 
         `by`: so many bytes more than the code says were pushed by the function of frame `shifted`.
         """
-        found: list[StackFrame] = []
+        frames: list[StackFrame] = []
         pc, place, sp = cpu.pc, cpu.pc, cpu.sp
-        while len(found) < _MOST_FRAMES:
+        while len(frames) < _MOST_FRAMES:
             height, entry = self.heights.get(pc, (0, -1))
-            base = sp - height - (by if len(found) == shifted else 0)
+            base = sp - height - (by if len(frames) == shifted else 0)
             back = cpu.peek_iram(base - 1) | cpu.peek_iram(base) << 8
             by_interrupt = entry in self.vectors
             call = back if by_interrupt else self.call_before(back)
             known = entry >= 0 and (entry == 0 or (base > 0 and call >= 0))
-            found.append(StackFrame(pc, place, entry if entry >= 0 else pc, base, by_interrupt, known))
+            frames.append(StackFrame(pc, place, entry if entry >= 0 else pc, base, by_interrupt, known))
             if entry == 0 or not known:
                 break
             pc, place, sp = back, call, base - 2
-        return found
+        return frames
 
     def out_of_step(self, cpu: Cpu, bottom: int) -> tuple[int, int] | None:
         """(frame, bytes that its function pushed more than the code says, or fewer) which make the stack whole again.

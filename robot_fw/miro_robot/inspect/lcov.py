@@ -72,7 +72,7 @@ def add(total: Tracefile, other: Mapping[str, FileRecord]) -> None:
 
 
 def encode(tracefile: Mapping[str, FileRecord]) -> str:
-    """The same counts give the same text."""
+    """The text of a tracefile. Equal counts give equal text."""
     lines = ["TN:"]
     for path in sorted(tracefile):
         lines += _encode_file(path, tracefile[path])
@@ -111,10 +111,10 @@ def decode(text: str, path: str) -> Tracefile:
     reader = _LineReader(path)
     for line in text.splitlines():
         reader.take(line.strip())
-    found: Tracefile = {}
+    tracefile: Tracefile = {}
     for name, part in reader.parts:
-        add(found, {name: part})
-    return found
+        add(tracefile, {name: part})
+    return tracefile
 
 
 class _LineReader:
@@ -127,8 +127,8 @@ class _LineReader:
         self._record: FileRecord | None = None
         self._leaders: dict[int, int] = {}  # first line by index: FNL, for the FNA that follow
 
-    def _wrong(self, what: str, remedy: str = _NAME_ANOTHER) -> BadInput:
-        return BadInput(self.path, self.number, what, remedy)
+    def _wrong(self, problem: str, remedy: str = _NAME_ANOTHER) -> BadInput:
+        return BadInput(self.path, self.number, problem, remedy)
 
     def take(self, line: str) -> None:
         self.number += 1

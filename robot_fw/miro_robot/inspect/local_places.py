@@ -69,43 +69,46 @@ class LocalPlaces:
 
     def _argument(self, variables: Variables) -> _Argument | None:
         """None where there is none, or it cannot be told which one it is."""
-        found = []
-        for one in self.parameters:
-            memory = self._memory(one, variables)
-            if one.storage == STACK or one.type.kind in ("bit", "bits"):
+        arguments = []
+        for parameter in self.parameters:
+            memory = self._memory(parameter, variables)
+            if parameter.storage == STACK or parameter.type.kind in ("bit", "bits"):
                 continue
-            if one.type.size > len(self.arrives_in):
+            if parameter.type.size > len(self.arrives_in):
                 continue
-            if one.storage == "R" or (memory and not self._is_numbered(memory)):
-                found.append(self._arrives(one, memory))
-        registers = [one for one in found if not one.memory]  # where others are in memory, these cannot be
-        if not registers and len(found) > 1:
-            registers = [one for one in found if self.is_brought(one)]
-        found = registers or found
-        return found[0] if len(found) == 1 else None
+            if parameter.storage == "R" or (memory and not self._is_numbered(memory)):
+                arguments.append(self._arrives(parameter, memory))
+        registers = [
+            argument for argument in arguments if not argument.memory
+        ]  # where others are in memory, these cannot be
+        if not registers and len(arguments) > 1:
+            registers = [argument for argument in arguments if self.is_brought(argument)]
+        arguments = registers or arguments
+        return arguments[0] if len(arguments) == 1 else None
 
     @property
     def has_frame(self) -> bool:
-        """Whether it has a frame pointer, and so all that is on the stack a known place."""
+        """True if it has a frame pointer, and so all that is on the stack a known place."""
         pointer = self.image.symbols.find("_bp")
         code = self.image.code[self.function.first : self.function.first + 2]
         return pointer is not None and code == bytes((_PUSH, pointer.address))
 
-    def _memory(self, one: LocalVariable, variables: Variables) -> range:
+    def _memory(self, variable: LocalVariable, variables: Variables) -> range:
         """Where it lies in a memory that has addresses."""
-        there = [each for each in variables.by_name.get(one.name, ()) if each.scope == self.name]
+        there = [each for each in variables.by_name.get(variable.name, ()) if each.scope == self.name]
         there = [each for each in there if each.module == self.module] or there
-        return range(there[0].address, there[0].address + one.type.size) if len(there) == 1 else range(0)
+        return range(there[0].address, there[0].address + variable.type.size) if len(there) == 1 else range(0)
 
     def _is_numbered(self, memory: range) -> bool:
-        """Whether the caller puts it there: `_f_PARM_2`."""
+        """True if the caller puts it there: `_f_PARM_2`."""
         names = self.image.symbols.names.items()
         return any(
-            name.startswith(f"_{self.name}_PARM_") and one.address == memory.start for name, one in names
+            name.startswith(f"_{self.name}_PARM_") and symbol.address == memory.start
+            for name, symbol in names
         )
 
-    def _arrives(self, one: LocalVariable, memory: range) -> _Argument:
-        home = tuple(self._place(register) for register in one.registers)
+    def _arrives(self, variable: LocalVariable, memory: range) -> _Argument:
+        home = tuple(self._place(register) for register in variable.registers)
         address = self.function.first
         prologue, framing = [address], -1
         while address in self.flow.effects and len(self.flow.after[address]) == 1:
@@ -117,10 +120,10 @@ class LocalPlaces:
                 break
             (address,) = self.flow.after[address]
             prologue.append(address)
-        return _Argument(one.name, home if -1 not in home else (), memory, prologue)
+        return _Argument(variable.name, home if -1 not in home else (), memory, prologue)
 
     def _brings(self, does: Effect, address: int, memory: range) -> bool:
-        """Whether an instruction does no more than to bring arguments to their homes, or to make the frame."""
+        """True if an instruction does no more than to bring arguments to their homes, or to make the frame."""
         held = self.flow.held[address]
         if does.mnemonic == "PUSH" or SP in does.writes or does.writes == {_PSW}:
             return True
@@ -131,25 +134,25 @@ class LocalPlaces:
         moved = [to in known and held.get(source) in arguments for to, source in does.moves]
         return bool(moved) and all(moved) and does.mnemonic in ("MOV", "XCH")
 
-    def is_brought(self, one: _Argument) -> bool:
-        """Whether the code brings it from the registers to its home."""
-        if one.memory:
-            return any(self._names(address, one.memory) for address in one.prologue[:-1])
-        held = self.flow.held.get(one.prologue[-1])
-        return bool(one.home) and held is not None and self._holds(held, one.home)
+    def is_brought(self, argument: _Argument) -> bool:
+        """True if the code brings it from the registers to its home."""
+        if argument.memory:
+            return any(self._names(address, argument.memory) for address in argument.prologue[:-1])
+        held = self.flow.held.get(argument.prologue[-1])
+        return bool(argument.home) and held is not None and self._holds(held, argument.home)
 
     def _place(self, register: str) -> int:
         place = _PLACES.get(register, -1)
         return place if place >= _FIRST_SFR or place < 0 else place + 8 * self.bank
 
     def _holds(self, held: Held, home: Collection[int]) -> bool:
-        """Whether it is there still as it arrived."""
+        """True if it is there still as it arrived."""
         return all(
             held[place] == {(ENTRY, there)} for place, there in zip(home, self.arrives_in, strict=False)
         )
 
     def _names(self, address: int, memory: range) -> bool:
-        """Whether an instruction reads or writes a memory, or takes its address."""
+        """True if an instruction reads or writes a memory, or takes its address."""
         does = self.flow.effects[address]
         first = self.flow.places[0]
         pointer = (
@@ -163,80 +166,80 @@ class LocalPlaces:
         """Those in registers or on the stack that the C of an instruction could name; inner ones first."""
         return self.blocks.visible(self.own, self.function.first, pc)
 
-    def of(self, one: LocalVariable, pc: int) -> tuple[int, ...] | str:
+    def of(self, variable: LocalVariable, pc: int) -> tuple[int, ...] | str:
         """The bytes of a variable in registers, low byte first, or why they cannot be told."""
-        key = (one, pc)
+        key = (variable, pc)
         if key not in self._of:
-            self._of[key] = self._is_at(one, pc)
+            self._of[key] = self._is_at(variable, pc)
         return self._of[key]
 
-    def _is_at(self, one: LocalVariable, pc: int) -> tuple[int, ...] | str:
+    def _is_at(self, variable: LocalVariable, pc: int) -> tuple[int, ...] | str:
         held = self.flow.held.get(pc)
         if held is None:
             return "its code cannot be followed"
         argument = self.argument
-        if argument is not None and one.name == argument.name and pc in argument.prologue:
-            return self._arrived(one, held)
-        home = self.home(one)
+        if argument is not None and variable.name == argument.name and pc in argument.prologue:
+            return self._arrived(variable, held)
+        home = self.home(variable)
         if not home:
             return "it was optimised away"
         if -1 in home:
             return "it is in a register of the compiler's own"
         if self.flow.live[pc].isdisjoint(home):
             return "its value is not needed from here on"
-        if argument is not None and one.name == argument.name and self._holds(held, home):
+        if argument is not None and variable.name == argument.name and self._holds(held, home):
             return home
         if any(address < 0 for place in home for address, _ in held[place]):
             return "nothing was assigned to it yet"
-        if not self._may_be_of(one, home, pc):
+        if not self._may_be_of(variable, home, pc):
             return "its registers hold something else"
-        if not self._is_alone(one, home) or self._has_rival(one, home, pc):
+        if not self._is_alone(variable, home) or self._has_rival(variable, home, pc):
             return "its registers may hold another variable"
         return home
 
-    def _has_rival(self, one: LocalVariable, home: tuple[int, ...], pc: int) -> bool:
-        """Whether another variable may be there: one with such a home, or one for which the debug file has none.
+    def _has_rival(self, variable: LocalVariable, home: tuple[int, ...], pc: int) -> bool:
+        """True if another variable may be there: one with such a home, or one for which the debug file has none.
 
         SDCC writes for some variables what it did with them before it had done.
         """
         for other in self.visible(pc):
-            if other.storage == "R" and other is not one:
-                if not other.registers and other.type.size == one.type.size:
+            if other.storage == "R" and other is not variable:
+                if not other.registers and other.type.size == variable.type.size:
                     return True
                 if self._shares(other, home) and self._may_be_of(other, self.home(other), pc):
                     return True
         return False
 
-    def home(self, one: LocalVariable) -> tuple[int, ...]:
+    def home(self, variable: LocalVariable) -> tuple[int, ...]:
         """Its registers as the debug file has them, low byte first; -1 for one of the compiler's own (B0 to B7)."""
-        return tuple(self._place(register) for register in one.registers)
+        return tuple(self._place(register) for register in variable.registers)
 
     def _shares(self, other: LocalVariable, home: tuple[int, ...]) -> bool:
         return not set(home).isdisjoint(self.home(other))
 
-    def _may_be_of(self, one: LocalVariable, home: tuple[int, ...], pc: int) -> bool:
-        """Whether all bytes that its home holds are needed later, and at the begin of a C line that may name it.
+    def _may_be_of(self, variable: LocalVariable, home: tuple[int, ...], pc: int) -> bool:
+        """True if all bytes that its home holds are needed later, and at the begin of a C line that may name it.
 
         So what the compiler keeps there within a line is not taken for it.
         """
         here = self.flow.held[pc]
         needed = self.flow.live[pc].issuperset(home)
-        return needed and any(self._same(here, there, home) for there in self._kept(one, home))
+        return needed and any(self._same(here, there, home) for there in self._kept(variable, home))
 
-    def _kept(self, one: LocalVariable, home: tuple[int, ...]) -> list[Held]:
+    def _kept(self, variable: LocalVariable, home: tuple[int, ...]) -> list[Held]:
         """What is held where a C line begins that may name it, and its home is needed later."""
         return [
             self.flow.held[address]
             for address in self.line_begins
-            if self.flow.live[address].issuperset(home) and one in self.visible(address)
+            if self.flow.live[address].issuperset(home) and variable in self.visible(address)
         ]
 
-    def _same(self, one: Held, other: Held, home: tuple[int, ...]) -> bool:
-        return all(not one[place].isdisjoint(other[place]) for place in home)
+    def _same(self, here: Held, other: Held, home: tuple[int, ...]) -> bool:
+        return all(not here[place].isdisjoint(other[place]) for place in home)
 
-    def _is_alone(self, one: LocalVariable, home: tuple[int, ...]) -> bool:
-        """Whether its home holds one thing only that outlasts a line: then no other variable has been there."""
-        waiting = self._kept(one, home)
+    def _is_alone(self, variable: LocalVariable, home: tuple[int, ...]) -> bool:
+        """True if its home holds one thing only that outlasts a line: then no other variable has been there."""
+        waiting = self._kept(variable, home)
         reached = waiting[:1]
         for held in reached:
             reached += [other for other in waiting if other not in reached and self._same(held, other, home)]
@@ -247,14 +250,14 @@ class LocalPlaces:
 
         `in_ram`: the memory is internal RAM, so that instructions name its bytes.
         """
-        one = next((one for one in self.parameters if one.name == name), None)
-        if one is None or pc not in self.flow.held:
+        parameter = next((parameter for parameter in self.parameters if parameter.name == name), None)
+        if parameter is None or pc not in self.flow.held:
             return ()
         argument = self.argument
         named = [address for address in self.flow.effects if self._names(address, memory)]
         if argument is not None and argument.name == name:
             if pc in argument.prologue[:-1]:
-                return self._arrived(one, self.flow.held[pc])
+                return self._arrived(parameter, self.flow.held[pc])
             if pc in self.flow.reached_without(self.function.first, named):
                 return "nothing was assigned to it yet"
         elif pc == self.function.first:
@@ -264,12 +267,12 @@ class LocalPlaces:
             return ()
         return "its value is not needed from here on"  # which may have been changed in registers
 
-    def _arrived(self, one: LocalVariable, held: Held) -> tuple[int, ...] | str:
+    def _arrived(self, variable: LocalVariable, held: Held) -> tuple[int, ...] | str:
         """In any of the registers, while no C line of the body has begun."""
-        found = []
-        for there in self.arrives_in[: one.type.size]:
+        registers = []
+        for there in self.arrives_in[: variable.type.size]:
             places = [place for place in self.flow.places if held[place] == {(ENTRY, there)}]
             if not places:
                 return "its registers hold something else"
-            found.append(places[0])
-        return tuple(found)
+            registers.append(places[0])
+        return tuple(registers)

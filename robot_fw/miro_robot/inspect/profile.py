@@ -55,9 +55,9 @@ def profile(image: Image, counters: Counters, activity: Activity) -> Profile:
     names = SymbolNames(image)
     by_function: dict[int, list[int]] = {}
     for address in counters.addresses():
-        found = by_function.setdefault(names.function(address)[0], [0, 0])
-        found[0] += counters.executed_at(address)
-        found[1] += counters.cycles_at(address)
+        row = by_function.setdefault(names.function(address)[0], [0, 0])
+        row[0] += counters.executed_at(address)
+        row[1] += counters.cycles_at(address)
     functions = [
         FunctionProfile(names.place(first), first, counters.executed_at(first), executed, spent)
         for first, (executed, spent) in by_function.items()

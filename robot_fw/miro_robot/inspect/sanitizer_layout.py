@@ -53,7 +53,7 @@ class Layout(msgspec.Struct, frozen=True, eq=False):
 
     @property
     def has_variables(self) -> bool:
-        """Whether C variables are known: Keil's maps have lines, and no sizes of variables."""
+        """True if C variables are known: Keil's maps have lines, and no sizes of variables."""
         return bool(self.names or self.local_names)
 
 

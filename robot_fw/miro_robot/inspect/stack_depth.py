@@ -76,7 +76,7 @@ class StackReader:
         """Of the whole image."""
         begun = [at for at in VECTORS if self._loaded(at) and self.code[at] in _FIRST_OF_VECTORS]
         interrupts = [self.depth(at) for at in begun]
-        deepest = max(interrupts, key=lambda one: one.size, default=None)
+        deepest = max(interrupts, key=lambda depth: depth.size, default=None)
         return StackDepth(self.depth(0), deepest)
 
     def depth(self, entry: int) -> Depth:
@@ -102,10 +102,10 @@ class StackReader:
             if size > best.size:
                 best = Depth(size, path)
         self._under_way.pop()
-        found = Depth(best.size, best.path, frozenset(unknown))
+        depth = Depth(best.size, best.path, frozenset(unknown))
         if "recursion" not in unknown or not self._under_way:
-            self._known[entry] = found
-        return found
+            self._known[entry] = depth
+        return depth
 
     def heights(self, entry: int) -> dict[int, int]:
         """Bytes above the entry, return address not counted, before each instruction of that function."""
@@ -136,10 +136,10 @@ class StackReader:
         """Where it may go on after an instruction, or after `size` bytes; calls return."""
         opcode = self.code[address]
         size = size or LENGTH[opcode]
-        found = [address + size] if goes_on(opcode) else []
+        following = [address + size] if goes_on(opcode) else []
         to = self._branch(address)
-        found += [] if to is None else [to]
-        return [*found, *self._table(address + size)] if opcode == JMP_TABLE else found
+        following += [] if to is None else [to]
+        return [*following, *self._table(address + size)] if opcode == JMP_TABLE else following
 
     def _table(self, address: int) -> Iterator[int]:
         """The jumps that follow JMP @A+DPTR one after the other, as SDCC writes a table."""

@@ -75,13 +75,13 @@ def functions(image: Image) -> list[tuple[int, str]]:
 
 def _sweep(image: Image) -> dict[int, bool]:
     """Addresses of instructions, one after the other, and whether the one before goes elsewhere or is padding."""
-    found: dict[int, bool] = {}
+    entries: dict[int, bool] = {}
     for first, end in image.used:
         address = first
         entry = True
         while address < end:
-            found[address] = entry
+            entries[address] = entry
             opcode = image.code[address]
             entry = opcode == _NOP or not goes_on(opcode)
             address += LENGTH[opcode]
-    return found
+    return entries

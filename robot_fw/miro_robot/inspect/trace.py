@@ -73,8 +73,8 @@ class InstructionTrace(Watcher):
         self._write_sleep()
         self.before = registers(cpu)
         if self.only is None or self.names.function(pc)[0] in self.only:
-            what = f"-- interrupt: {INTERRUPTS[source]}, to {self.names.place(cpu.pc)}"
-            self.write(f"{12 * start:>12}  {pc:04X}  {self.names.place(pc):<28}  {what}")
+            text = f"-- interrupt: {INTERRUPTS[source]}, to {self.names.place(cpu.pc)}"
+            self.write(f"{12 * start:>12}  {pc:04X}  {self.names.place(pc):<28}  {text}")
 
     def slept(self, cpu: Cpu, start: int, end: int) -> None:
         first, until = self.sleep

@@ -44,8 +44,8 @@ def write_value(cpu: Cpu, image: Image, name: str, value: Any, as_type: str = ""
         for offset, byte in enumerate(data):
             cpu.poke_iram(variable.address + offset, byte)
     else:
-        what = f"is in {variable.space}, not in internal RAM"
-        raise BadInput(image.path, name, what, "write it by firmware")
+        problem = f"is in {variable.space}, not in internal RAM"
+        raise BadInput(image.path, name, problem, "write it by firmware")
 
 
 def bytes_at(cpu: Cpu, image: Image, variable: Variable) -> bytes:

@@ -54,7 +54,7 @@ class Signal(NamedTuple):
 
     @property
     def on_board(self) -> bool:
-        """Whether a CPU alone does not have it."""
+        """True if a CPU alone does not have it."""
         return self.place == "data" or "." in self.place
 
 
@@ -169,7 +169,7 @@ class Waveform:
 
     @property
     def begun(self) -> bool:
-        """Whether the window was reached."""
+        """True if the window was reached."""
         return self._writer is not None
 
     def close(self) -> None:

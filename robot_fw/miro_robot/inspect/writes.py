@@ -65,7 +65,7 @@ class Bytes:
 
     @property
     def is_whole(self) -> bool:
-        """Whether all bits are meant."""
+        """True if all bits are meant."""
         return self.mask == (1 << 8 * (self.end - self.first)) - 1
 
     def bits(self, mask: int) -> Bytes:
@@ -73,7 +73,7 @@ class Bytes:
         return Bytes(self.space, self.first, self.end - self.first, mask)
 
     def same(self, other: Bytes) -> bool:
-        mine, others = ((one.space, one.first, one.end, one.mask) for one in (self, other))
+        mine, others = ((side.space, side.first, side.end, side.mask) for side in (self, other))
         return mine == others
 
     def writers(self, code: bytes, instructions: Iterable[int], on_stack: bool = True) -> set[int]:
@@ -85,14 +85,14 @@ class Bytes:
         return {address for address in instructions if self._may_read(code, address, on_stack)}
 
     def are_read(self, cpu: Cpu) -> bool:
-        """Whether the instruction that `cpu` executes next reads one of them; a byte with all of its bits."""
+        """True if the instruction that `cpu` executes next reads one of them; a byte with all of its bits."""
         return any(
             self._holds(space, address) and self.mask >> 8 * (address - self.first) & mask
             for space, address, mask in _read_places(cpu)
         )
 
     def are_written(self, cpu: Cpu) -> bool:
-        """Whether the instruction that `cpu` executes next writes one of them."""
+        """True if the instruction that `cpu` executes next writes one of them."""
         for space, address in _written_places(cpu):
             if self._holds(space, address):
                 mask = self.mask >> 8 * (address - self.first) & 0xFF
@@ -209,7 +209,7 @@ def _read_places(cpu: Cpu) -> Iterator[tuple[str, int, int]]:
 
 
 def _moves_sp(opcode: int) -> bool:
-    """Whether it pushes or pops."""
+    """True if it pushes or pops."""
     return ROW[opcode] in (_PUSH, _POP, *_RETURNS) or is_call(opcode)
 
 
@@ -235,11 +235,11 @@ def cpu_bit(cpu: Cpu, bit: int) -> int:
 
 def instructions_of(code: bytes, used: Iterable[tuple[int, int]], known: Iterable[int]) -> set[int]:
     """Where instructions may begin: the `known` places, and those one after the other from each of them on."""
-    found: set[int] = set()
+    addresses: set[int] = set()
     loaded = [range(first, end) for first, end in used]
-    waiting = sorted({*known, *(one.start for one in loaded)})
+    waiting = sorted({*known, *(span.start for span in loaded)})
     for address in waiting:
-        while address not in found and any(address in one for one in loaded):
-            found.add(address)
+        while address not in addresses and any(address in span for span in loaded):
+            addresses.add(address)
             address += LENGTH[code[address]]
-    return found
+    return addresses

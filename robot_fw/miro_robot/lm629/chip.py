@@ -383,7 +383,7 @@ class Lm629:
         return self.trajectory.position >> 16
 
     def _commanded_target(self) -> int:
-        """That of the last STT accepted; before its sample, with the positions of the sample before (P5)."""
+        """Target of the last STT accepted; before its sample, with the positions of the sample before (P5)."""
         buffer = self.trajectory_buffer
         if not self.start_taken or self.options.breakpoint_base == "working":
             return self.trajectory.target

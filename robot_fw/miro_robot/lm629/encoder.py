@@ -114,7 +114,7 @@ class Encoder:
         self.set_place(tick, (b + b) | (a ^ b))
 
     def set_place(self, tick: int, place: int) -> None:
-        """The same; `place` is that of A and B in the forward order."""
+        """Sets A and B from `tick` on by their place (0..3) in the forward order."""
         if not self.seen:
             self.seen = 1
             self.quadrature.take(place)

@@ -12,7 +12,7 @@ class Bus:
 
     NOT_STATE: tuple[str, ...] = ()
     HAS_XRAM = False
-    """Whether all 64 KB of external RAM are there."""
+    """True if all 64 KB of external RAM are there."""
 
     def port_written(self, port: int, latch: int, tick: int) -> None:
         """Latch of P0..P3 (`port` 0..3) is now `latch`; the pins follow at `tick`, S1P1 of the next cycle."""

@@ -199,7 +199,7 @@ class Chip:
         self.lines[address] = _MARK if self.lines[address] & _MARK else self.line_at(address)
 
     def is_loaded(self, address: int) -> bool:
-        """Whether executing at `address` is legal."""
+        """True if executing at `address` is legal."""
         return not self.lines[address & 0xFFFF] & _OUTSIDE
 
     def code_at(self, address: int) -> int:
@@ -275,7 +275,7 @@ class Chip:
     # Observers
 
     def asleep(self) -> bool:
-        """Whether only a reset or a new input can make it execute another instruction."""
+        """True if only a reset or a new input can make it execute another instruction."""
         idle_for_ever = self.idle != 0 and self.peripherals.next_event(self.cycles) == NEVER_TICK
         return self.powered_down != 0 or idle_for_ever
 
@@ -298,7 +298,7 @@ class Chip:
         return min(self.next_event, self.until, self.next_mark)
 
     def _taken_over(self) -> bool:
-        """Whether an interrupt is in service, or one just was: silicon grants main level one instruction after RETI,
+        """True if an interrupt is in service, or one just was: silicon grants main level one instruction after RETI,
         which does not count as time of its own.
         """
         return self.peripherals.interrupts.in_service != 0 or self.cycles - self.blocked <= _ONE_INSTRUCTION

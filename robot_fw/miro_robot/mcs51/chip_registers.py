@@ -98,7 +98,7 @@ class ChipRegisters:
     # Watchdog
 
     def counts_idle(self) -> int:
-        """Whether the watchdog counts while the processor sleeps in idle mode."""
+        """True if the watchdog counts while the processor sleeps in idle mode."""
         return 1
 
     def period(self) -> int:
@@ -127,7 +127,7 @@ class ChipRegisters:
         self.due_cycle = due
 
     def watches(self) -> int:
-        """Whether the watchdog will reset the processor though no interrupt wakes it."""
+        """True if the watchdog will reset the processor though no interrupt wakes it."""
         return 1 if self.watching and (self.counts_idle() or not self.cpu.idle) else 0
 
     def due(self) -> int:

@@ -146,14 +146,14 @@ class Cpu(Chip):
         return 0
 
     def executes_next(self) -> bool:
-        """Whether it goes on with the instruction at `pc`: it does not sleep, and no interrupt is entered before."""
+        """True if it goes on with the instruction at `pc`: it does not sleep, and no interrupt is entered before."""
         if self.idle or self.powered_down:
             return False
         self.peripherals.sync(self.cycles)
         return self.blocked == self.cycles or self.peripherals.interrupts.choose(self.cycles) < 0
 
     def _note_end(self, now: int) -> None:
-        """Whether a mark, or sleep that nothing known ends, ends the run at the start of cycle `now`."""
+        """True if a mark, or sleep that nothing known ends, ends the run at the start of cycle `now`."""
         if not self.idle and not self.powered_down:
             if self.lines[self.pc] & _MARK:
                 self.stop = _BREAKPOINT

@@ -73,7 +73,7 @@ class Line:
                 self.full = not self.unread
 
     def _change_last(self, tick: int, level: int) -> None:
-        """The same on the tick of the last edge. Edges alternate, so replacing that one takes it back."""
+        """Changes the level on the tick of the last edge. Edges alternate, so this removes that edge."""
         last = self.last_tick()
         if tick < last:
             raise ValueError(f"edge at tick {tick} comes after one at tick {last}")

@@ -221,7 +221,7 @@ def disassemble(code: bytes | bytearray, address: int, names: Names = NUMBERS) -
 
 
 def is_conditional(opcode: int) -> bool:
-    """Whether the instruction goes one of two ways: JB, JC, JZ, CJNE, DJNZ and their like."""
+    """True if the instruction goes one of two ways: JB, JC, JZ, CJNE, DJNZ and their like."""
     mnemonic, operands = _TEXT[ROW[opcode]]
     return operands.endswith("rel") and mnemonic != "SJMP"
 
@@ -233,7 +233,7 @@ def target(code: bytes, address: int) -> int | None:
 
 
 def jumps_to_itself(code_at: Callable[[int], int], address: int) -> bool:
-    """Whether an SJMP, LJMP or AJMP stands there that goes where it stands. `code_at(a)`: byte of code memory."""
+    """True if an SJMP, LJMP or AJMP stands there that goes where it stands. `code_at(a)`: byte of code memory."""
     opcode, first, second = (code_at((address + offset) & 0xFFFF) for offset in range(3))
     if opcode == _SJMP:
         return first == 0xFE
@@ -256,7 +256,7 @@ def _absolute(opcode: int, first: int, second: int, address: int) -> int | None:
 
 
 def goes_on(opcode: int) -> bool:
-    """Whether the instruction after it may be executed next; so it may be after a call."""
+    """True if the instruction after it may be executed next; so it may be after a call."""
     return opcode not in _LEAVING and ROW[opcode] != _AJMP
 
 

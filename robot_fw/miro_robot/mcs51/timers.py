@@ -201,7 +201,7 @@ class Timers:
         return self.th[number & 1] if number & 2 else self.tl[number & 1]
 
     def write(self, number: int, value: int) -> int:
-        """The same. Returns the timers, as bits of IE, whose flag may come sooner by it: not those that stand."""
+        """Writes 0..3 as `read`. Returns the running timers whose flag may come sooner, as bits of IE."""
         timer = number & 1
         self._store(timer)
         if number & 2:

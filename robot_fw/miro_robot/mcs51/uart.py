@@ -318,14 +318,14 @@ class Uart:
         most = _LAST_BIT + 1 - number if 1 <= number <= _LAST_BIT else 1
         if not self.latch & 1:
             return False
-        found = self.rxd.samples(first, _ROLLOVERS * period, 3 * period, tick, most)
-        more = (found >> 16) - 1  # than one bit
+        sampled = self.rxd.samples(first, _ROLLOVERS * period, 3 * period, tick, most)
+        more = (sampled >> 16) - 1  # than one bit
         if more < 0:
             return False
-        level = found >> more & 1
+        level = sampled >> more & 1
         self.rx_last = level
         self.rx_votes = 3 * level
-        self.rx_bits |= (found & ((1 << more) - 1)) << number >> 1
+        self.rx_bits |= (sampled & ((1 << more) - 1)) << number >> 1
         self.rx_count += idle + 4 + _ROLLOVERS * more
         self.rx_next = first + (4 + _ROLLOVERS * more) * period
         self._act(self.rx_next - period)

@@ -73,11 +73,11 @@ class I2cTarget(Part):
     # For a part that derives from it
 
     def addressed(self, byte: int, tick: int) -> int:
-        """Whether it acknowledges an address byte: seven bits and, lowest, 1 if the master wants to read."""
+        """True if it acknowledges an address byte: seven bits and, lowest, 1 if the master wants to read."""
         raise NotImplementedError
 
     def received(self, byte: int, tick: int) -> int:
-        """Whether it acknowledges a byte of the master's."""
+        """True if it acknowledges a byte of the master's."""
         raise NotImplementedError
 
     def transmit(self, tick: int) -> int:

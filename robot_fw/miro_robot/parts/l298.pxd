@@ -24,11 +24,11 @@ cdef class L298Part(Part):
 
     @cython.locals(channel=int)
     cpdef changed(self, unsigned int pins, long long tick)
-    @cython.locals(mode=int, direction=int, one=Channel, number=int, level=int)
+    @cython.locals(mode=int, direction=int, bridge=Channel, number=int, level=int)
     cdef int _follow(self, int channel, long long tick) except -1
     @cython.locals(inputs=int, number=int)
     cdef int _mode(self, int channel) noexcept
-    @cython.locals(channel=int, one=Channel)
+    @cython.locals(channel=int, bridge=Channel)
     cpdef due(self, long long tick)
     @cython.locals(a=Channel, b=Channel)
     cdef void _plan(self, long long latest) noexcept

@@ -151,8 +151,8 @@ class L298Part(Part):
     def supply(self, on: int, tick: int) -> None:
         self.is_on = on
         self.changed(_ALL, tick)
-        for one in self.channels:
-            one.settle(one.direction)
+        for bridge in self.channels:
+            bridge.settle(bridge.direction)
         self.next_tick = _NEVER
 
     def changed(self, pins: int, tick: int) -> None:
@@ -165,9 +165,9 @@ class L298Part(Part):
         """Outputs as the inputs say."""
         mode = self._mode(channel)
         direction = (mode == _FORWARD) - (mode == _BACKWARD)
-        one: Channel = self.channels[channel]
-        if direction != one.direction:
-            one.turn(direction, tick)
+        bridge: Channel = self.channels[channel]
+        if direction != bridge.direction:
+            bridge.turn(direction, tick)
         for number in range(2):
             level = self.level((_EN_B if channel else _EN_A) + 1 + number)
             self.drive((_OUT_3 if channel else _OUT_1) + number, RELEASED if mode == _COAST else level)
@@ -179,9 +179,9 @@ class L298Part(Part):
 
     def due(self, tick: int) -> None:
         for channel in range(2):
-            one: Channel = self.channels[channel]
-            if one.still_tick <= tick:
-                one.settle(one.direction)
+            bridge: Channel = self.channels[channel]
+            if bridge.still_tick <= tick:
+                bridge.settle(bridge.direction)
         self._plan(_NEVER)
 
     def _plan(self, latest: int) -> None:
@@ -191,9 +191,9 @@ class L298Part(Part):
 
     def read(self, name: str, tick: int) -> float | int | bool | str:
         channel = "ab".index(name[0])
-        one: Channel = self.channels[channel]
+        bridge: Channel = self.channels[channel]
         if name.endswith("mode"):
             return _MODES[self._mode(channel)]
         if name.endswith("duty"):
-            return one.duty()
-        return self.crystal_hz / one.last_ticks if one.last_ticks > 0 else 0.0
+            return bridge.duty()
+        return self.crystal_hz / bridge.last_ticks if bridge.last_ticks > 0 else 0.0

@@ -235,13 +235,13 @@ class Nets:
         return reaching
 
     def is_output(self, net: int) -> bool:
-        """Whether something else than a port can drive a net."""
+        """True if something else than a port can drive a net."""
         kinds = self._kinds(net)
         tied = (*self.netlist.highs, *self.netlist.lows, *self.netlist.pull_downs, *self.latch_nets)
         return net in tied or kinds.count(IN) < len(kinds)
 
     def _may_contend(self, net: int, netlist: Netlist) -> bool:
-        """Whether a strong high and a strong low may meet on a net: then the CPU has to be there when they do."""
+        """True if a strong high and a strong low may meet on a net: then the CPU has to be there when they do."""
         kinds = self._kinds(net)
         both = sum(kind in (STRONG, TWO_WAY) for kind in kinds) + self.latch_nets.count(net)
         lows = kinds.count(OPEN_DRAIN) + netlist.lows.count(net)

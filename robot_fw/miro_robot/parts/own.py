@@ -29,9 +29,9 @@ def check_state(part: Part, tick: int) -> None:
     try:
         _check(part)
     except Exception as error:
-        what = f"{error}" if isinstance(error, ValueError) else described(error)
+        problem = f"{error}" if isinstance(error, ValueError) else described(error)
         place = f"part {part.name!r} ({part.keys.name}), tick {tick}"
-        raise PluginError(f"{place}: {what}", "mend its STATE or NOT_STATE, or what it sets") from error
+        raise PluginError(f"{place}: {problem}", "mend its STATE or NOT_STATE, or what it sets") from error
 
 
 def _check(part: Part) -> None:
@@ -58,5 +58,5 @@ def _check(part: Part) -> None:
         try:
             kind.decode(kind.encode(value), 0)
         except Exception as error:
-            what = f"{error}" if isinstance(error, ValueError) else described(error)
-            raise ValueError(f"attribute {name!r} is {value!r:.40}: {what}") from error
+            problem = f"{error}" if isinstance(error, ValueError) else described(error)
+            raise ValueError(f"attribute {name!r} is {value!r:.40}: {problem}") from error

@@ -42,9 +42,9 @@ class Part:
         "faults",  # the board takes them at once
     )
     CONTINUOUS = False
-    """Whether it moves on all the time: `advance` is called before each event of a part that is wired to it."""
+    """True if it moves on all the time: `advance` is called before each event of a part that is wired to it."""
     SENSES_DRIVE = False
-    """Whether `changed` is also called when only `is_driven` of a pin changes: a motor that is let go coasts."""
+    """True if `changed` is also called when only `is_driven` of a pin changes: a motor that is let go coasts."""
 
     def __init__(self, keys: PartKeys, place: Place) -> None:
         self.keys = keys
@@ -83,7 +83,7 @@ class Part:
         return self.outside >> pin & 1
 
     def is_driven(self, pin: int) -> int:
-        """Whether another part drives the net to a level, strongly: 0 where it floats or hangs on a resistor."""
+        """True if another part drives the net to a level, strongly: 0 where it floats or hangs on a resistor."""
         return self.driven >> pin & 1
 
     def drive(self, pin: int, level: int) -> None:

@@ -132,8 +132,8 @@ class _Resolver:
                 self.wire(net, place).pins.append((name, self.numbers[name][pin], inverted))
         for name, buffer in spec.buffers.items():
             if len(buffer.pins) != 8:
-                what = f"has {amount(len(buffer.pins), 'pin')}"
-                raise BoardError("", f"buffers.{name}.pins", what, "list eight, bit 0 first")
+                problem = f"has {amount(len(buffer.pins), 'pin')}"
+                raise BoardError("", f"buffers.{name}.pins", problem, "list eight, bit 0 first")
             for bit, target in enumerate(buffer.pins):
                 place = f"buffers.{name}.pins[{bit}]"
                 net, inverted = self.target(target, place)
@@ -151,8 +151,10 @@ class _Resolver:
         numbers = self.numbers[name]
         for pin in part.pins:
             if pin not in numbers:
-                place, what = f"parts.{name}.pins.{pin}", f"{part.keys.name} has no such pin"
-                raise BoardError("", place, what, did_you_mean(pin, numbers, f"it has {', '.join(numbers)}"))
+                place, problem = f"parts.{name}.pins.{pin}", f"{part.keys.name} has no such pin"
+                raise BoardError(
+                    "", place, problem, did_you_mean(pin, numbers, f"it has {', '.join(numbers)}")
+                )
         for needed in part.keys.PINS:
             if (
                 not needed.optional
@@ -189,9 +191,9 @@ class _Resolver:
         if not dot and NAME.fullmatch(word):
             for table in ("parts", "latches"):
                 if word in getattr(self.spec, table):
-                    what = f"{word} is a {'part' if table == 'parts' else 'latch'}, not a net"
+                    problem = f"{word} is a {'part' if table == 'parts' else 'latch'}, not a net"
                     raise BoardError(
-                        "", place, what, f"name one of its pins, as {word}.{self.first_pin(word)}"
+                        "", place, problem, f"name one of its pins, as {word}.{self.first_pin(word)}"
                     )
             return word, inverted
         if not NAME.fullmatch(owner):
@@ -257,8 +259,8 @@ class _Resolver:
             return
         place = f"parts.{name}.pins.{pin}"
         if inverted or net != self.named.get(port, port):
-            what = f"{name} carries the serial line, and {pin} is not on {port}"
-            raise BoardError("", place, what, f'write {pin} = "{port}"')
+            problem = f"{name} carries the serial line, and {pin} is not on {port}"
+            raise BoardError("", place, problem, f'write {pin} = "{port}"')
         for other, part in self.spec.parts.items():
             if other < name and part.keys.AT:
                 raise BoardError("", place, f"{other} carries the serial line, too", "leave one of them out")
@@ -333,14 +335,14 @@ class _Resolver:
     def check_inverters(self, wire: _Wire) -> None:
         for part, number, inverted in wire.pins:
             if inverted and self.kind(part, number) in (OPEN_DRAIN, TWO_WAY):
-                what = "an inverter goes one way, this pin both"
-                raise BoardError("", self.place_of(part, number), what, "leave out the !")
+                problem = "an inverter goes one way, this pin both"
+                raise BoardError("", self.place_of(part, number), problem, "leave out the !")
 
     def check_constant(self, name: str, wire: _Wire) -> None:
         for part, number, _ in wire.pins:
             if self.kind(part, number) == STRONG:
-                what = f'an output cannot be tied to "{name}"'
-                raise BoardError("", self.place_of(part, number), what, "leave the pin out, or name a net")
+                problem = f'an output cannot be tied to "{name}"'
+                raise BoardError("", self.place_of(part, number), problem, "leave the pin out, or name a net")
 
     def check_high(self, name: str, wire: _Wire) -> None:
         """That who listens to the net can find it high: P0 and open-drain pins cannot do that."""
@@ -356,19 +358,19 @@ class _Resolver:
             place = self.place_of(*wire.pins[0][:2]) if wire.pins else wire.place
             kinds = [self.kind(part, number) for part, number, _ in wire.pins]
             why = ": P0 is open drain" if wire.ports else ": it is open drain" if OPEN_DRAIN in kinds else ""
-            what = f"nothing can drive {name} high{why}"
-            raise BoardError("", place, what, f'add pull_ups = ["{name}"], or "{name}" to it')
+            problem = f"nothing can drive {name} high{why}"
+            raise BoardError("", place, problem, f'add pull_ups = ["{name}"], or "{name}" to it')
 
     def check_low(self, name: str, wire: _Wire) -> None:
         """That a contact to VCC does something at the processor, which reads a net that nothing drives as high."""
         if wire.strap or wire.pulled_down or wire.latches or not (wire.ports or wire.buffers):
             return
-        outputs = [one for one in wire.pins if self.kind(*one[:2]) != IN]
-        idle = [one for one in outputs if self.spec.parts[one[0]].keys.never_low]
+        outputs = [pin for pin in wire.pins if self.kind(*pin[:2]) != IN]
+        idle = [pin for pin in outputs if self.spec.parts[pin[0]].keys.never_low]
         if idle and len(idle) == len(outputs):
-            what = f"the processor reads {name} as high, closed or open"
+            problem = f"the processor reads {name} as high, closed or open"
             raise BoardError(
-                "", self.place_of(*idle[0][:2]), what, f'add pull_downs = ["{name}"], or "{name}" to it'
+                "", self.place_of(*idle[0][:2]), problem, f'add pull_downs = ["{name}"], or "{name}" to it'
             )
 
     # The list

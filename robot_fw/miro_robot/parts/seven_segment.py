@@ -139,7 +139,7 @@ class SevenSegmentPart(Part):
     def read(self, name: str, tick: int) -> float | int | bool | str:
         seen = [self.seen[digit] for digit in range(self.count)]
         if name == "digits":
-            return len([one for one in seen if one])
+            return len([lit for lit in seen if lit])
         if name == "segments":
-            return "".join([f"{one:02x}" for one in seen])
-        return "".join([_GLYPHS.get(one & 0x7F, "?") + ("." if one & 0x80 else "") for one in seen])
+            return "".join([f"{lit:02x}" for lit in seen])
+        return "".join([_GLYPHS.get(lit & 0x7F, "?") + ("." if lit & 0x80 else "") for lit in seen])

@@ -78,5 +78,5 @@ def _takes(kind: Any) -> str:
     """What a key takes, where that is one of a few words."""
     info = msgspec.inspect.type_info(kind)
     options = info.types if isinstance(info, msgspec.inspect.UnionType) else (info,)
-    literals = [one for one in options if isinstance(one, msgspec.inspect.LiteralType)]
-    return use_one_of([str(value) for one in literals for value in one.values]) if literals else ""
+    literals = [literal for literal in options if isinstance(literal, msgspec.inspect.LiteralType)]
+    return use_one_of([str(value) for literal in literals for value in literal.values]) if literals else ""

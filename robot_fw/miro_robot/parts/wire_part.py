@@ -29,11 +29,11 @@ class WirePart(Part):
         Part.supply(self, on, tick)
 
     def gives(self, first_tick: int, tick: int, bit_ticks: int) -> bool:
-        """Whether a character of the processor gets on the line: it began at `first_tick`, its stop bit at `tick`."""
+        """True if a character of the processor gets on the line: it began at `first_tick`, its stop bit at `tick`."""
         raise NotImplementedError
 
     def takes(self, first_tick: int, end_tick: int, characters: int) -> bool:
-        """Whether so many of the host come to the processor, from `first_tick` on; asked before that.
+        """True if so many of the host come to the processor, from `first_tick` on; asked before that.
 
         `end_tick`: the begin of the last stop bit, which idle lines hold as well.
         """

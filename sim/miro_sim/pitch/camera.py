@@ -286,7 +286,7 @@ class Camera:
                 self._cover_with(body, top, bottom, first, end)
 
     def _cover_with(self, body: int, top: int, bottom: int, first: int, end: int) -> None:
-        """The same for one robot: line by line, between the corners above and below.
+        """Marks the pixels that one robot covers: line by line, between the corners above and below.
 
         Where it stands still, all instants of a field are like its first one.
         """
@@ -374,15 +374,15 @@ class Camera:
                 for number in range(self.worked):
                     at = axis * _AXIS + number * _LINES + (row & 1) * _LINE + column
                     for lane in range(4):
-                        one, other = self.corner[at + lane], self.corner[at + lane + 1]
-                        least[lane] = min(least[lane], min(one, other))
-                        most[lane] = max(most[lane], max(one, other))
+                        first, other = self.corner[at + lane], self.corner[at + lane + 1]
+                        least[lane] = min(least[lane], min(first, other))
+                        most[lane] = max(most[lane], max(first, other))
                 for lane in range(4):
                     self.line_least[line + column + lane] = least[lane]
                     self.line_most[line + column + lane] = most[lane]
 
     def _bound_pixel(self, column: int) -> None:
-        """The same between the corners above and below a pixel."""
+        """Bounds between the corners above and below a pixel."""
         least, most = self.line_least, self.line_most
         self.least_u = min(least[column], least[_LINE + column])
         self.most_u = max(most[column], most[_LINE + column])
@@ -390,7 +390,7 @@ class Camera:
         self.most_v = max(most[_LINES + column], most[_LINES + _LINE + column])
 
     def _inside(self, at: int) -> bool:
-        """Whether all samples of a pixel lie in a rectangle at all instants; `at`: where its edges are."""
+        """True if all samples of a pixel lie in a rectangle at all instants; `at`: where its edges are."""
         return (
             self.least_u > self.edges[at]
             and self.most_u <= self.edges[at + 1]
@@ -399,7 +399,7 @@ class Camera:
         )
 
     def _outside(self, at: int) -> bool:
-        """Whether all lie beyond the same side of it."""
+        """True if all lie beyond the same side of it."""
         return (
             self.most_u <= self.edges[at]
             or self.least_u > self.edges[at + 1]
@@ -477,8 +477,10 @@ class Camera:
         within = [0] * 4
         for at in range(first, end, 4):
             for lane in range(4):
-                one, other = self.place_of[u + at + lane], self.place_of[v + at + lane]
-                within[lane] += ((one > low_u) - (one > high_u)) & ((other > low_v) - (other > high_v))
+                place_u, other = self.place_of[u + at + lane], self.place_of[v + at + lane]
+                within[lane] += ((place_u > low_u) - (place_u > high_u)) & (
+                    (other > low_v) - (other > high_v)
+                )
         return within[0] + within[1] + within[2] + within[3]
 
     def _spread(self, row: int, column: int, axis: int) -> None:
@@ -522,9 +524,12 @@ class Camera:
         fall_u, fall_v = self.fall_u, self.fall_v
         upper = number * _LINES + (row & 1) * _LINE + column
         lower = number * _LINES + (~row & 1) * _LINE + column
-        above, one = self._across(upper), self._across(upper + 1)
+        above, below_it = self._across(upper), self._across(upper + 1)
         below, other = self._across(lower), self._across(lower + 1)
-        least, most = min(min(above, one), min(below, other)), max(max(above, one), max(below, other))
+        least, most = (
+            min(min(above, below_it), min(below, other)),
+            max(max(above, below_it), max(below, other)),
+        )
         first, end = number * self.samples, (number + 1) * self.samples
         fall = abs(fall_u) + abs(fall_v)
         if least > (_HALF_UM + 1) * fall or most < (-_HALF_UM - 1) * fall:
@@ -605,7 +610,7 @@ class Camera:
         return self.identity_paint[body] if self._lies_in(_IDENTITY, u, v) else self.black
 
     def _lies_in(self, box: int, u: int, v: int) -> bool:
-        """Whether a place lies in a rectangle."""
+        """True if a place lies in a rectangle."""
         at = 4 * box
         return self.edges[at] < u <= self.edges[at + 1] and self.edges[at + 2] < v <= self.edges[at + 3]
 

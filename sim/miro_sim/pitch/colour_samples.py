@@ -23,7 +23,7 @@ def samples_of(
 ) -> Samples:
     """Sampled pixels (Y, Cb, Cr) by name of the colour, the floor's among them, and the ball's if there is one."""
     camera = Camera(lens, picture, PATTERNS[pattern], Stream(0, "colour samples"))
-    found: Samples = {}
+    samples: Samples = {}
     frame = 0
     for x_m, y_m in PLACES_M:
         for number in range(len(IDENTITIES)):
@@ -33,17 +33,17 @@ def samples_of(
             camera.begin(frame, 0)
             for name, place in zip((TEAMS[team], IDENTITIES[number]), PATTERNS[pattern], strict=True):
                 at = (x_m + place[0] / 1000.0, y_m + place[1] / 1000.0, ROBOT_HEIGHT_M)
-                found.setdefault(name, []).extend(_pixels(camera, at))
+                samples.setdefault(name, []).extend(_pixels(camera, at))
             frame += 1
         camera.clear()
         if ball:
             camera.ball(x_m, y_m)
         camera.begin(frame, 0)
         if ball:
-            found.setdefault(BALL, []).extend(_pixels(camera, (x_m, y_m, BALL_RADIUS_M)))
-        found.setdefault(FLOOR, []).extend(_pixels(camera, (x_m + 0.1, y_m, 0.0)))
+            samples.setdefault(BALL, []).extend(_pixels(camera, (x_m, y_m, BALL_RADIUS_M)))
+        samples.setdefault(FLOOR, []).extend(_pixels(camera, (x_m + 0.1, y_m, 0.0)))
         frame += 1
-    return found
+    return samples
 
 
 def _pixels(camera: Camera, at: tuple[float, float, float]) -> list[tuple[int, int, int]]:

@@ -1,4 +1,4 @@
-"""Whether robots touch: squares seen from above, checked at the ticks of a grid in time.
+"""True if robots touch: squares seen from above, checked at the ticks of a grid in time.
 
 Pushing will need the robots at one tick, so the grid is where they meet.
 
@@ -23,23 +23,23 @@ Pose = tuple[float, float, float]
 """x and y in m, heading in rad."""
 
 
-def touch(one: Pose, other: Pose) -> bool:
-    """Whether two robots' squares overlap or touch (separating axes)."""
-    dx, dy = other[0] - one[0], other[1] - one[1]
-    sin, cos = sincos(other[2] - one[2])
+def touch(first: Pose, other: Pose) -> bool:
+    """True if two robots' squares overlap or touch (separating axes)."""
+    dx, dy = other[0] - first[0], other[1] - first[1]
+    sin, cos = sincos(other[2] - first[2])
     reach = ROBOT_HALF_M + ROBOT_HALF_M * (abs(sin) + abs(cos))
-    return not (_apart(dx, dy, one[2], reach) or _apart(dx, dy, other[2], reach))
+    return not (_apart(dx, dy, first[2], reach) or _apart(dx, dy, other[2], reach))
 
 
 def _apart(dx: float, dy: float, theta_rad: float, reach: float) -> bool:
-    """Whether a distance is longer than `reach` along one of the axes of a robot."""
+    """True if a distance is longer than `reach` along one of the axes of a robot."""
     sin, cos = sincos(theta_rad)
     return abs(dx * cos + dy * sin) > reach or abs(dy * cos - dx * sin) > reach
 
 
-def next_look(tick: int, one: Pose, other: Pose, closing_m_s: float) -> int:
+def next_look(tick: int, first: Pose, other: Pose, closing_m_s: float) -> int:
     """The first tick of the grid after `tick` at which they may touch, as they stand at `tick`."""
-    dx, dy = other[0] - one[0], other[1] - one[1]
+    dx, dy = other[0] - first[0], other[1] - first[1]
     gap_m = math.sqrt(dx * dx + dy * dy) - 2.0 * CIRCLE_M
     wait = 0
     if gap_m > 0.0:

@@ -39,7 +39,7 @@ def reach_m(theta_rad: float) -> float:
 
 
 def holds(posture: Posture) -> bool:
-    """Whether all four corners of the robot's square are on the pitch."""
+    """True if all four corners of the robot's square are on the pitch."""
     reach = reach_m(posture.theta_rad)
     return (
         LEFT_M + reach <= posture.x_m <= RIGHT_M - reach and BOTTOM_M + reach <= posture.y_m <= TOP_M - reach

@@ -39,9 +39,9 @@ FULL = 4095
 
 def packed(black_floor: bool) -> list[int]:
     """All paints by number, each as one integer whose sums are sums of colours; 0 to `FULL` a colour."""
-    found = []
+    words = []
     for name, paint in PAINTS.items():
         red, green, blue = BLACK_FLOOR if black_floor and name == "floor" else paint
         red, green, blue = (FULL * part // 1000 for part in (red, green, blue))
-        found.append(red | green << BITS | blue << 2 * BITS)
-    return found
+        words.append(red | green << BITS | blue << 2 * BITS)
+    return words

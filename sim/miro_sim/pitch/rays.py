@@ -102,7 +102,7 @@ class Rays:
 
 
 def enters(u: int, v: int, fall_u: int, fall_v: int) -> bool:
-    """Whether the line from (u, v) on by the fall meets the square of a robot (separating axes)."""
+    """True if the line from (u, v) on by the fall meets the square of a robot (separating axes)."""
     if (u < -_HALF_UM and u + fall_u < -_HALF_UM) or (u > _HALF_UM and u + fall_u > _HALF_UM):
         return False  # both ends are beyond one side
     if (v < -_HALF_UM and v + fall_v < -_HALF_UM) or (v > _HALF_UM and v + fall_v > _HALF_UM):

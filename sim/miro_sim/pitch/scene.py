@@ -89,12 +89,12 @@ class Scene:
         return f"Scene({self.rays!r}, ball={(self.ball_x, self.ball_y) if self.has_ball else None})"
 
     def shows_ball(self, pixel: int) -> bool:
-        """Whether one of a pixel's samples may be the ball's; `behind` has been called."""
+        """True if one of a pixel's samples may be the ball's; `behind` has been called."""
         paint = self.paint[pixel]
         return self.has_ball and (paint == _MIXED or paint >= self.ball_rim) and self._near_ball(pixel)
 
     def _near_ball(self, pixel: int) -> bool:
-        """Whether the ball may be seen in a pixel: looked at along each axis alone."""
+        """True if the ball may be seen in a pixel: looked at along each axis alone."""
         rays = self.rays
         far = _BALL_UM + rays.spread_um
         x, y = rays.middle_x[pixel] - self.ball_x, rays.middle_y[pixel] - self.ball_y
@@ -229,7 +229,7 @@ class Scene:
         return self.line if self._on_line(x, y, 0) else self.floor
 
     def _inside(self, x: int, y: int, more: int) -> bool:
-        """Whether a place (distances from the middle) is between the walls or in a goal, both `more` wide each way."""
+        """True if a place (distances from the middle) is between the walls or in a goal, both `more` wide each way."""
         if y <= _GOAL_HALF_UM + more and x <= self.half_x + _GOAL_DEPTH_UM + more:
             return True
         if x > self.half_x + more or y > self.half_y + more:

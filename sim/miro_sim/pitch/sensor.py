@@ -37,7 +37,7 @@ _ABOVE = 4096  # is added to noise, so that no sum with a value is negative
 
 def _normals() -> list[int]:
     """4096 quantiles of a standard normal, in the middle of as many equal shares, times 65536."""
-    found = []
+    normals = []
     for step in range(_DRAWS // 2):
         magnitude = (2 * step + 1) << 51
         cell = bisect_right(rng.HALF_NORMAL, magnitude) - 1
@@ -45,8 +45,8 @@ def _normals() -> list[int]:
         fraction = float(magnitude - low) / float(high - low)
         middle = (float(cell) + 0.5) * 0.0625
         place = fraction - 0.03125 * middle * fraction * (1.0 - fraction)
-        found.append(math.floor((float(cell) + place) * 4096.0 + 0.5))
-    return found + [0 - value for value in found]
+        normals.append(math.floor((float(cell) + place) * 4096.0 + 0.5))
+    return normals + [0 - value for value in normals]
 
 
 def _taps(bandwidth_hz: float) -> list[int]:

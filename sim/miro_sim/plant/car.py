@@ -289,7 +289,9 @@ class CarPart(OnShaft):
         return self.at_x_cm if name == "x_cm" else self.at_y_cm
 
     def _speed_cm_s(self) -> float:
-        motors = [one for one in (self.left, self.right, self.rear_left, self.rear_right) if one is not None]
+        motors = [
+            wheel for wheel in (self.left, self.right, self.rear_left, self.rear_right) if wheel is not None
+        ]
         rad_s = 0.0
         for motor in motors:
             rad_s += motor.rad_s

@@ -68,7 +68,7 @@ class Body:
         self._roll(1)
 
     def _push(self, left_nms: float, right_nms: float, ticks: int, step: int) -> None:
-        """The same without moving on: what the shafts turn is kept as `step` of those that `_roll` looks at."""
+        """Applies impulses and friction; saves the turn of the shafts as number `step` for `_roll`."""
         old_left = self.left_rad_s
         old_right = self.right_rad_s
         self.turned_left_rad[step] = 0.0

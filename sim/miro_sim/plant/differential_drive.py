@@ -79,8 +79,8 @@ class DrivePart(Part):
         for part, _ in self.place.peers.get(pin, []):
             if isinstance(part, Lm629Part):
                 return part
-        what = f"no LM629 listens to pin {self.keys.PINS[pin].name}"
-        raise PluginError(what, "wire it to pin a of one")
+        problem = f"no LM629 listens to pin {self.keys.PINS[pin].name}"
+        raise PluginError(problem, "wire it to pin a of one")
 
     def start(self, tick: int) -> None:
         if self.left is None:

@@ -131,7 +131,7 @@ class Winding:
         return self._pass(ticks, emf_v)
 
     def _pass(self, ticks: int, emf_v: float) -> float:
-        """The same unchecked; NaN where a result is not finite: the body's next angle raises DomainError."""
+        """`step` without the check. NaN if a result is not finite: the body's next angle raises DomainError."""
         wait = self.wait_ticks
         if wait == 0 or wait > ticks:
             self.wait_ticks = wait - ticks if wait else 0
@@ -184,7 +184,7 @@ class Winding:
         return final * ticks - self.tau[kind] * self.current_a
 
     def rests(self) -> bool:
-        """Whether no current flows and the bridge is off and stays so: nothing drives a shaft that stands."""
+        """True if no current flows and the bridge is off and stays so: nothing drives a shaft that stands."""
         return self.current_a == 0.0 and self.drive == 0 and self.wait_ticks == 0
 
     def after_load(self) -> None:
@@ -344,7 +344,7 @@ class Quadrature:
 
 
 def is_rough(params: DriveParams) -> bool:
-    """Whether anything is on that `chassis.Body` does not know: then the body is a `rough.RoughBody`."""
+    """True if anything is on that `chassis.Body` does not know: then the body is a `rough.RoughBody`."""
     chassis = params.chassis
     rubs = chassis.stiction_ratio > 1.0 or chassis.gear_load_friction > 0.0 or params.ball.friction > 0.0
     plays = params.tyre.grip is not None or chassis.gear_backlash_rad > 0.0
@@ -461,7 +461,7 @@ class DifferentialDrive(Plant):
         self.next_tick = begin + LONGEST_STEP
 
     def _stands(self) -> bool:
-        """Whether all steps up to the next edge of PWM change nothing."""
+        """True if all steps up to the next edge of PWM change nothing."""
         if self.body.left_rad_s != 0.0 or self.body.right_rad_s != 0.0:
             return False
         still = self.rough is None or self.rough.stands()

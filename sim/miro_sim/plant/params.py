@@ -109,7 +109,7 @@ class Disturbance(Ranged, frozen=True, forbid_unknown_fields=True, kw_only=True)
     period_s: Annotated[float, Within(0.001, 3600.0)] = 1.0  # of the sine, and how long a draw holds
 
     def is_on(self) -> bool:
-        """Whether there is any force or torque."""
+        """True if there is any force or torque."""
         return any(getattr(self, name) for name in self.__struct_fields__ if name != "period_s")
 
 

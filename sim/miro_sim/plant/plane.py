@@ -70,7 +70,7 @@ class Plane:
         return min(away, -_EDGE if self._is_dark(x, y) else _EDGE)
 
     def _is_dark(self, x: float, y: float) -> bool:
-        """Whether the cell of the picture at a point is dark."""
+        """True if the cell of the picture at a point is dark."""
         if x < 0.0 or y < 0.0 or x >= _FAR or y >= _FAR:
             return False
         row, column = int(y / self.cell_cm), int(x / self.cell_cm)

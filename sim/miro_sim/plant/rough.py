@@ -162,7 +162,7 @@ class RoughBody(Body):
         self.turned_rad = [0.0] * 16
 
     def stands(self) -> bool:
-        """Whether steps change nothing while no motor drives: nothing moves, pushes or is about to relax."""
+        """True if steps change nothing while no motor drives: nothing moves, pushes or is about to relax."""
         still = self.v_m_s == 0.0 and self.u_m_s == 0.0 and self.w_rad_s == 0.0 and not self.forces.is_on
         forceless = self.left_force_n == 0.0 and self.right_force_n == 0.0
         return still and forceless and self.left_load_n == 0.0 and self.right_load_n == 0.0

@@ -70,7 +70,7 @@ class Sender:
         return stop << (_CHARACTER - 1) | data[index] << 1
 
     def bad_stop(self, stops: bytes, number: int) -> bool:
-        """Whether bit `number` is a bad stop bit."""
+        """True if bit `number` is a bad stop bit."""
         if len(stops) == 0 or number % _CHARACTER != _CHARACTER - 1:
             return False
         return stops[number // _CHARACTER] != 0

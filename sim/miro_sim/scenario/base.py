@@ -31,16 +31,16 @@ def with_base(raw: Table, origin: str, tables_of: Callable[[str], Table]) -> tup
         return raw, []
     name = raw[SCENARIO]
     if not isinstance(name, str) or not name:
-        what = f"expected a name or a path, got {name!r}"
-        raise ScenarioError(origin, SCENARIO, what, 'write scenario = "silent"')
+        problem = f"expected a name or a path, got {name!r}"
+        raise ScenarioError(origin, SCENARIO, problem, 'write scenario = "silent"')
     own = {key: value for key, value in raw.items() if key not in (SCENARIO, SET)}
     settings = raw.get(SET, {})
     if not isinstance(settings, dict):
         raise ScenarioError(origin, SET, "expected a table of keys", "write set = { KEY = VALUE }")
     _check_no_part_of_network(own.get(NETWORK), origin, name)
     if is_path(name) and not origin:
-        what = "stands in a file that depends on no other one"
-        raise ScenarioError(origin, SCENARIO, what, "name a built-in scenario, or record the run again")
+        problem = "stands in a file that depends on no other one"
+        raise ScenarioError(origin, SCENARIO, problem, "name a built-in scenario, or record the run again")
     with ScenarioError.at(origin, SCENARIO):
         path = beside(origin, name)
     try:
@@ -49,8 +49,8 @@ def with_base(raw: Table, origin: str, tables_of: Callable[[str], Table]) -> tup
         place = ": ".join(part for part in (f"{error.path}", f"{error.place}") if part)
         raise ScenarioError(origin, SCENARIO, f"{place}: {error.what}", error.remedy) from None
     if SCENARIO in base:
-        what = f"{name} is itself another scenario with keys changed"
-        raise ScenarioError(origin, SCENARIO, what, f"name {base[SCENARIO]!r}, and repeat its keys")
+        problem = f"{name} is itself another scenario with keys changed"
+        raise ScenarioError(origin, SCENARIO, problem, f"name {base[SCENARIO]!r}, and repeat its keys")
     with ScenarioError.at(origin):
         check_numbers(settings, SET)  # before they are written as text
     complete = {**base, **own}
@@ -64,9 +64,9 @@ def _check_no_part_of_network(given: Any, origin: str, name: str) -> None:
         isinstance(entry, dict) and isinstance(entry.get("robot"), dict) for entry in entries
     )
     if part:
-        what = f"a header such as [network.robot.controller] changes no single key of {name}"
+        problem = f"a header such as [network.robot.controller] changes no single key of {name}"
         remedy = f"at the top of the file write set = {{ {_key_in(given)} }} instead"
-        raise ScenarioError(origin, NETWORK, what, remedy)
+        raise ScenarioError(origin, NETWORK, problem, remedy)
 
 
 def _key_in(given: Any) -> str:
@@ -84,7 +84,7 @@ def _key_in(given: Any) -> str:
 
 
 def is_path(name: str) -> bool:
-    """Whether a scenario's name is that of a file: without a separator or suffix it is a built-in one."""
+    """True if a scenario's name is that of a file: without a separator or suffix it is a built-in one."""
     return name.endswith(".toml") or "/" in name or "\\" in name
 
 

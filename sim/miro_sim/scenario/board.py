@@ -106,7 +106,7 @@ class BoardScenario(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_
     @property
     def boards(self) -> dict[str, BoardSpec]:
         """All boards by their names, in the order of these."""
-        return {self.board_name: self.board, **{name: one.board for name, one in self.others.items()}}
+        return {self.board_name: self.board, **{name: on_line.board for name, on_line in self.others.items()}}
 
     def at(self, path: str) -> tuple[BoardSpec, str]:
         """The board of the name of a pin, and what the pin is called there. Raises ValueError for no board's."""

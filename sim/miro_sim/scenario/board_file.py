@@ -139,15 +139,15 @@ def _read(table: dict[str, Any], struct: type[_T]) -> _T:
     try:
         return msgspec.convert(table, struct)
     except msgspec.ValidationError as error:
-        what, path = what_and_path(f"{error}")
-    if what.startswith("Object ") or "..." in path:
+        problem, path = what_and_path(f"{error}")
+    if problem.startswith("Object ") or "..." in path:
         try:
             return struct_of(table, struct)
         except BadInput as error:
             remedy = _REMEDIES.get(f"{error.place}", error.remedy)
             raise BoardError("", error.place, error.what, remedy) from None
     choices = _REMEDIES.get(path) or choices_of(struct, path)
-    raise BoardError("", path, *explained(what, path, value_at(table, path), choices))
+    raise BoardError("", path, *explained(problem, path, value_at(table, path), choices))
 
 
 def _spec(file: _File, parts: dict[str, PartSpec], name: str) -> BoardSpec:
@@ -181,13 +181,13 @@ def _check_processor(file: _File) -> None:
         remedy = did_you_mean(file.chip, CHIPS, use_one_of(CHIPS))
         raise BoardError("", "chip", f"there is no chip {file.chip!r}", remedy)
     if file.mode != "12T":
-        what = "6T mode is not modelled" if file.mode == "6T" else f"{file.mode!r} is no mode"
+        problem = "6T mode is not modelled" if file.mode == "6T" else f"{file.mode!r} is no mode"
         remedy = "leave it out and give twice the crystal as crystal_hz" if file.mode == "6T" else 'use "12T"'
-        raise BoardError("", "mode", what, remedy)
+        raise BoardError("", "mode", problem, remedy)
     if file.xram == "internal" and not CHIPS[file.chip].xram_bytes:
         having = [chip for chip, kind in CHIPS.items() if kind.xram_bytes]
-        what = f"{file.chip} has no RAM of its own for MOVX"
-        raise BoardError("", "xram", what, f'use "none" or "external", or chip = "{having[0]}"')
+        problem = f"{file.chip} has no RAM of its own for MOVX"
+        raise BoardError("", "xram", problem, f'use "none" or "external", or chip = "{having[0]}"')
 
 
 def _check_memory(file: _File) -> None:
@@ -201,16 +201,16 @@ def _check_memory(file: _File) -> None:
         for name, device in getattr(file, table).items():
             place = f"{table}.{name}"
             if device.address & ~device.mask:
-                what = f"address {device.address:#06x} has bits that mask {device.mask:#06x} leaves out"
-                raise BoardError("", place, what, "no address would match; clear them in the address")
+                problem = f"address {device.address:#06x} has bits that mask {device.mask:#06x} leaves out"
+                raise BoardError("", place, problem, "no address would match; clear them in the address")
             for other, there in before.items():
                 if not (device.address ^ there.address) & device.mask & there.mask:
                     address = device.address | there.address
-                    what = f"answers to address {address:#06x}, as {table}.{other} does"
-                    raise BoardError("", place, what, "give one another address, or a mask of more bits")
+                    problem = f"answers to address {address:#06x}, as {table}.{other} does"
+                    raise BoardError("", place, problem, "give one another address, or a mask of more bits")
             if file.xram == "external" and device.address < _xram_bytes(file):
-                what = f"answers to address {device.address:#06x}, as the external RAM does"
-                raise BoardError("", place, what, f"give xram_bytes of at most {device.address:#x}")
+                problem = f"answers to address {device.address:#06x}, as the external RAM does"
+                raise BoardError("", place, problem, f"give xram_bytes of at most {device.address:#x}")
             before[name] = device
 
 
@@ -227,8 +227,8 @@ def _part(name: str, table: dict[str, Any]) -> PartSpec:
     with BoardError.at("", place):
         kind = table.get("part")
         if not isinstance(kind, str):
-            what = "this key is missing" if kind is None else "expected a string"
-            raise BoardError("", "part", what, 'say which part it is, as part = "led"')
+            problem = "this key is missing" if kind is None else "expected a string"
+            raise BoardError("", "part", problem, 'say which part it is, as part = "led"')
         try:
             struct = PARTS.find(kind)
             check_struct(struct)
@@ -254,8 +254,8 @@ def keys_of(struct: type[PartKeys], table: dict[str, Any]) -> PartKeys:
             remedy = error.remedy or f"see `mirotwin boards show {struct.__struct_config__.tag}`"
         raise BoardError("", error.place, error.what, remedy) from None
     except (Exception, SystemExit) as error:
-        what = f"part {struct.__struct_config__.tag!r} cannot check its keys: {raised(error)}"
-        raise BoardError("", "", what, "repair the part") from error
+        problem = f"part {struct.__struct_config__.tag!r} cannot check its keys: {raised(error)}"
+        raise BoardError("", "", problem, "repair the part") from error
 
 
 def check_struct(struct: type[PartKeys]) -> None:
@@ -264,16 +264,16 @@ def check_struct(struct: type[PartKeys]) -> None:
     if not isinstance(pins, tuple) or not all(isinstance(pin, Pin) for pin in pins):
         raise PluginError(f"part {name!r}: PINS are {pins!r:.80}", "write PINS = (Pin(..), Pin(..))")
     if len(pins) > MOST_PART_PINS:
-        what = f"part {name!r} has {amount(len(pins), 'pin')}"
-        raise PluginError(what, f"a part has at most {MOST_PART_PINS}")
+        problem = f"part {name!r} has {amount(len(pins), 'pin')}"
+        raise PluginError(problem, f"a part has at most {MOST_PART_PINS}")
     names = [pin.name for pin in pins]
     for pin in pins:
         if not isinstance(pin.name, str) or not NAME.fullmatch(pin.name) or names.count(pin.name) > 1:
-            what = f"part {name!r}: a pin is called {pin.name!r}"
-            raise PluginError(what, "give each a name of its own, of letters, digits and _")
+            problem = f"part {name!r}: a pin is called {pin.name!r}"
+            raise PluginError(problem, "give each a name of its own, of letters, digits and _")
         if pin.kind not in (IN, STRONG, OPEN_DRAIN, TWO_WAY) or pin.level not in (0, 1):
-            what = f"part {name!r}: pin {pin.name} is {pin!r:.120}"
-            raise PluginError(what, "kind is IN, STRONG, OPEN_DRAIN or TWO_WAY, level 0 or 1")
+            problem = f"part {name!r}: pin {pin.name} is {pin!r:.120}"
+            raise PluginError(problem, "kind is IN, STRONG, OPEN_DRAIN or TWO_WAY, level 0 or 1")
     for word, values in (("PUTS", struct.PUTS), ("READS", struct.READS)):
         if not isinstance(values, dict) or not all(isinstance(key, str) for key in values):
             raise PluginError(f"part {name!r}: {word} is {values!r:.80}", f'write {word} = {{"name": ..}}')
@@ -281,9 +281,9 @@ def check_struct(struct: type[PartKeys]) -> None:
         try:
             msgspec.inspect.type_info(kind)
         except (Exception, SystemExit) as error:
-            what = f"part {name!r}: PUTS[{key!r}] is no type of a value: {raised(error)}"
+            problem = f"part {name!r}: PUTS[{key!r}] is no type of a value: {raised(error)}"
             raise PluginError(
-                what, "use bool, int, float, Literal[..], or Annotated[float, Meta(..)]"
+                problem, "use bool, int, float, Literal[..], or Annotated[float, Meta(..)]"
             ) from error
 
 

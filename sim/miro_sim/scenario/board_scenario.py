@@ -103,7 +103,7 @@ def load_any(source: str, settings: Sequence[str] = ()) -> AnyText:
 
 
 def is_board(source: str) -> bool:
-    """Whether it names a board, and no scenario."""
+    """True if it names a board, and no scenario."""
     return source.endswith(ENDING) or (source in builtin_boards() and source not in builtin_names())
 
 
@@ -138,7 +138,8 @@ def tables_of_board(scenario: BoardScenario) -> Table:
     }
     if scenario.others:
         others = {
-            name: {BOARD: table_of(one.board), "image": one.image} for name, one in scenario.others.items()
+            name: {BOARD: table_of(on_line.board), "image": on_line.image}
+            for name, on_line in scenario.others.items()
         }
         every[BOARD] = {scenario.board_name: {BOARD: table_of(scenario.board)}, **others}
     return {key: value for key, value in every.items() if value not in ("", 0, {}) or value is False}
@@ -149,7 +150,7 @@ def _read(source: str) -> Table:
 
 
 def _complete(raw: Table, origin: str) -> Table:
-    """The same with the board as a table, and with the image's path as it is called from here."""
+    """The tables with the board as a table, and the image's path relative to here."""
     complete = dict(raw)
     if origin and isinstance(raw.get(FIRMWARE), str):
         complete[FIRMWARE] = _beside(origin, FIRMWARE, raw[FIRMWARE])
@@ -159,8 +160,8 @@ def _complete(raw: Table, origin: str) -> Table:
     if isinstance(board, str) and board:
         complete[BOARD] = _board_table(origin, board)
     elif not isinstance(board, dict):
-        what = f"expected a path, a name or a table, got {board!r}"
-        raise ScenarioError(origin, BOARD, what, 'write board = "NAME.board.toml"')
+        problem = f"expected a path, a name or a table, got {board!r}"
+        raise ScenarioError(origin, BOARD, problem, 'write board = "NAME.board.toml"')
     elif _is_line(board):
         complete[BOARD] = {name: _on_line(origin, name, board[name], complete) for name in sorted(board)}
     if origin:
@@ -169,10 +170,10 @@ def _complete(raw: Table, origin: str) -> Table:
 
 
 def _is_line(board: Table) -> bool:
-    """Whether these are several boards on one line, each in a table of its name: one at least says which it is."""
-    tables = [one for name, one in board.items() if name not in KEYS]
-    return all(isinstance(one, dict) for one in board.values()) and any(
-        "file" in one or BOARD in one for one in tables
+    """True if these are several boards on one line, each in a table of its name: one at least says which it is."""
+    tables = [value for name, value in board.items() if name not in KEYS]
+    return all(isinstance(value, dict) for value in board.values()) and any(
+        "file" in table or BOARD in table for table in tables
     )
 
 
@@ -189,8 +190,8 @@ def _on_line(origin: str, name: str, table: Table, scenario: Table) -> Table:
         path = _beside(origin, f"{place}.{FIRMWARE}", keys.firmware)
         if name == min(scenario[BOARD]):
             if FIRMWARE in scenario:
-                what = "is that of the whole scenario, which names one, too"
-                raise ScenarioError(origin, f"{place}.{FIRMWARE}", what, "leave one of them out")
+                problem = "is that of the whole scenario, which names one, too"
+                raise ScenarioError(origin, f"{place}.{FIRMWARE}", problem, "leave one of them out")
             scenario[FIRMWARE] = path
         else:
             complete["image"] = load_hex(path).content.decode("latin-1")
@@ -207,8 +208,8 @@ def _board_table(origin: str, board: str) -> Table:
 def _beside(origin: str, key: str, path: str) -> str:
     """What a file names, as it is called from here. Raises ScenarioError for what lies outside of its folder."""
     if not origin:
-        what = "names a file, and stands in none itself"
-        raise ScenarioError(origin, key, what, "write the whole table instead")
+        problem = "names a file, and stands in none itself"
+        raise ScenarioError(origin, key, problem, "write the whole table instead")
     with ScenarioError.at(origin, key):
         return path_beside(origin, path)
 
@@ -281,28 +282,28 @@ def _line(tables: Table) -> tuple[str, BoardSpec, dict[str, OtherBoard]]:
                 raise BadInput(
                     "", "", "cannot be the name of a board", "use letters, digits and _, not a digit first"
                 )
-            one = struct_of(tables[name], _OnLine)
+            entry = struct_of(tables[name], _OnLine)
             for key in ("file", FIRMWARE):  # what is in the file has been read
-                if getattr(one, key):
+                if getattr(entry, key):
                     raise BadInput("", key, "cannot be set", "change it in the scenario's file")
-            if not one.board:
+            if not entry.board:
                 raise BadInput("", "file", "this key is missing", 'add file = "NAME.board.toml"')
             with ScenarioError.at("", BOARD):
-                spec = board_of_table(one.board, "", name)
-            boards[name], images[name] = _strapped(spec, one.straps), one.image
+                spec = board_of_table(entry.board, "", name)
+            boards[name], images[name] = _strapped(spec, entry.straps), entry.image
             if not images[name] and name != min(tables):
                 raise BadInput("", FIRMWARE, "no firmware is named", 'write firmware = "IMAGE.hex"')
     first = min(boards)
     for name, board in boards.items():
         if board.crystal_hz != boards[first].crystal_hz:
-            what = f"{board.crystal_hz} Hz, and {first} has {boards[first].crystal_hz} Hz"
+            problem = f"{board.crystal_hz} Hz, and {first} has {boards[first].crystal_hz} Hz"
             remedy = (
                 "boards on one line need one crystal: give both the same, and each its baud rate for that"
             )
-            raise BadInput("", f"{BOARD}.{name}.crystal_hz", what, remedy)
+            raise BadInput("", f"{BOARD}.{name}.crystal_hz", problem, remedy)
     if not 2 <= len(boards) <= MOST_BOARDS:
-        what = f"{amount(len(boards), 'board')} on one line"
-        raise BadInput("", BOARD, what, f'give 2 to {MOST_BOARDS}, or board = ".." for one')
+        problem = f"{amount(len(boards), 'board')} on one line"
+        raise BadInput("", BOARD, problem, f'give 2 to {MOST_BOARDS}, or board = ".." for one')
     others = {
         name: OtherBoard(board=board, image=images[name]) for name, board in boards.items() if name != first
     }
@@ -312,14 +313,14 @@ def _line(tables: Table) -> tuple[str, BoardSpec, dict[str, OtherBoard]]:
 def _puts_on_line(name: str, board: BoardSpec, others: dict[str, OtherBoard], table: Table) -> Table:
     """As `_puts`, of several boards, whose names come first."""
     puts: Table = {}
-    boards = {name: board, **{other: one.board for other, one in others.items()}}
+    boards = {name: board, **{other: on_line.board for other, on_line in others.items()}}
     for path, value in leaves(table):
-        one, _, rest = path.partition(".")
-        if one not in boards:
-            remedy = did_you_mean(one, boards, f"the boards are {', '.join(boards)}")
-            raise BadInput("", f"put.{path}", f"there is no board {one!r}", remedy)
-        taken = _puts(boards[one], {rest: value}, f"put.{one}")
-        puts.update({f"{one}.{own}": value for own, value in taken.items()})
+        device, _, rest = path.partition(".")
+        if device not in boards:
+            remedy = did_you_mean(device, boards, f"the boards are {', '.join(boards)}")
+            raise BadInput("", f"put.{path}", f"there is no board {device!r}", remedy)
+        taken = _puts(boards[device], {rest: value}, f"put.{device}")
+        puts.update({f"{device}.{own}": value for own, value in taken.items()})
     return puts
 
 
@@ -363,8 +364,8 @@ def _puts(board: BoardSpec, table: Table, place: str = "put") -> dict[str, Any]:
 def check_single(scenario: BoardScenario, origin: str, command: str) -> None:
     """Raises BadInput for several boards on one line, for a command that takes one."""
     if scenario.others:
-        what = f"it has {amount(len(scenario.boards), 'board')} on one line, and {command} takes one"
-        raise BadInput(origin, BOARD, what, "`mirotwin run`, `test`, `replay`, `diff`, `serve` take them")
+        problem = f"it has {amount(len(scenario.boards), 'board')} on one line, and {command} takes one"
+        raise BadInput(origin, BOARD, problem, "`mirotwin run`, `test`, `replay`, `diff`, `serve` take them")
 
 
 def firmware_beside(text: BoardText) -> str:

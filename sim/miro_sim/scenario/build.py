@@ -39,16 +39,16 @@ def check_robots(scenario: sc.Scenario, origin: str) -> None:
             place = f"network[{number}].robot[{index}]"
             try:
                 reference, start = reference_and_start(robot, scenario.duration_s)
-                found = robot_problem(
+                misplaced = robot_problem(
                     reference, start, robot.reference, robot.controller, scenario.duration_s, lens
                 )
             except PluginError as error:
                 raise ScenarioError(origin, f"{place}.reference", error.what, error.remedy) from error
             except DomainError as error:  # a heading of a million radians
                 raise ScenarioError(origin, f"{place}.reference", f"leaves the pitch: {error}") from error
-            if found is not None:
-                key, what, remedy = found
-                raise ScenarioError(origin, f"{place}.{key}", what, remedy)
+            if misplaced is not None:
+                key, reason, remedy = misplaced
+                raise ScenarioError(origin, f"{place}.{key}", reason, remedy)
 
 
 def reference_for(robot: sc.RobotSpec, duration_s: float) -> Trajectory:
@@ -113,8 +113,10 @@ def _remembering(plugin: Any, maker: Any) -> Any:
 def _a_plugin(plugin: Any, method: str, maker: Any) -> Any:
     """What `maker` returned, which has to have this method. Raises PluginError."""
     if not hasattr(plugin, method):
-        what = f"`{maker.__name__}` returned {plugin!r:.40}"
-        raise PluginError(at_place(what, defined_at(maker)), f"return an object with the method `{method}`")
+        problem = f"`{maker.__name__}` returned {plugin!r:.40}"
+        raise PluginError(
+            at_place(problem, defined_at(maker)), f"return an object with the method `{method}`"
+        )
     return plugin
 
 
@@ -125,8 +127,8 @@ def _made(word: str, name: str, make: Callable[[], Any]) -> Any:
     except PluginError as error:
         raise PluginError(f"{word} {name!r} cannot be made: {error.what}", error.remedy) from error
     except (Exception, SystemExit) as error:
-        what = f"{word} {name!r} cannot be made: {raised(error)}"
-        raise PluginError(what, f"mend the {word} or its parameters") from error
+        problem = f"{word} {name!r} cannot be made: {raised(error)}"
+        raise PluginError(problem, f"mend the {word} or its parameters") from error
 
 
 def pilot_and_drive(

@@ -76,11 +76,11 @@ def origin_problem(places: Places, law: LawParameters) -> Problem | None:
     if nearest is None:
         return None
     t_s, at = nearest
-    what = (
+    problem = (
         f"passes the origin: after {t_s:.2f} s, at {_place(at)}, it is {100.0 * at.rho_m:.2f} cm away, and the law"
         f" {law.name()!r}, which has polar coordinates, needs {100.0 * clearance_m:.1f} cm"
     )
-    return what, "lead it past the origin at a greater distance, or choose another law, such as body_frame"
+    return problem, "lead it past the origin at a greater distance, or choose another law, such as body_frame"
 
 
 def _place(at: Reference) -> str:

@@ -54,14 +54,14 @@ class ScenarioError(BadInput):
 class Refused(BadInput):
     """A key or a value that cannot be used, of which the caller knows the place: what, and what to write instead."""
 
-    def __init__(self, what: str, remedy: str = "") -> None:
-        super().__init__("", "", what, remedy)
+    def __init__(self, problem: str, remedy: str = "") -> None:
+        super().__init__("", "", problem, remedy)
 
 
 def value_error(origin: str, raw: dict[str, Any], message: str) -> ScenarioError:
     """What msgspec found, in the words of the file: path without `$`, and a remedy."""
-    what, path = toml_text.what_and_path(message)
-    unknown = re.fullmatch(r"(?s)Object contains unknown field `(.*)`", what)
+    problem, path = toml_text.what_and_path(message)
+    unknown = re.fullmatch(r"(?s)Object contains unknown field `(.*)`", problem)
     if unknown:
         known = _keys_at(raw, path)
         place = f"{path}.{unknown[1]}" if path else unknown[1]
@@ -70,28 +70,28 @@ def value_error(origin: str, raw: dict[str, Any], message: str) -> ScenarioError
         if not path and remedy.startswith("keys here"):
             remedy += "; `mirotwin scenarios show fig6` has those of their tables, too"
         return ScenarioError(origin, place, "unknown key", remedy)
-    missing = re.fullmatch(r"Object missing required field `(.*)`", what)
+    missing = re.fullmatch(r"Object missing required field `(.*)`", problem)
     if missing:
         place = f"{path}.{missing[1]}" if path else missing[1]
         shown = "add it, as in `mirotwin scenarios show fig6`" if missing[1] in PARTS_OF_A_ROBOT else "add it"
         return ScenarioError(origin, place, "this key is missing", _choices_at(raw, place) or shown)
-    inner = re.fullmatch(r"(?s)([a-z0-9_.]+(?:\[\d+\])?(?:\.[a-z0-9_]+)*): (.*)", what)
+    inner = re.fullmatch(r"(?s)([a-z0-9_.]+(?:\[\d+\])?(?:\.[a-z0-9_]+)*): (.*)", problem)
     if inner:  # a rule between keys (`Network.__post_init__`) names the place below its own table
         path = f"{path}.{inner[1]}" if path else inner[1]
-        what = inner[2]
-    limit = re.fullmatch(r"(\w+) must be (.*), got (.*)", what)
+        problem = inner[2]
+    limit = re.fullmatch(r"(\w+) must be (.*), got (.*)", problem)
     if limit:  # a parameter of the drive or of the radio
         path = f"{path}.{limit[1]}"
         remedy = f"must be {limit[2]}{_unit_of(path)}"
         return ScenarioError(origin, path, f"{limit[3]} is out of range", remedy)
-    what, _, remedy = what.partition("; ")
+    problem, _, remedy = problem.partition("; ")
     value = value_at(raw, path)
-    return ScenarioError(origin, path, *explained(what, path, value, remedy or _choices_at(raw, path)))
+    return ScenarioError(origin, path, *explained(problem, path, value, remedy or _choices_at(raw, path)))
 
 
-def explained(what: str, path: str, value: Any, remedy: str) -> tuple[str, str]:
+def explained(problem: str, path: str, value: Any, remedy: str) -> tuple[str, str]:
     """What is wrong with a value, and the remedy: what msgspec found at a key path, in the words of the file."""
-    wrong_type = re.fullmatch(r"Expected `([\w |]+)`, got `(\w+)`", what)
+    wrong_type = re.fullmatch(r"Expected `([\w |]+)`, got `(\w+)`", problem)
     if wrong_type:
         want = " or ".join(
             TYPE_NAMES.get(name, name) for name in wrong_type[1].split(" | ") if name != "null"
@@ -99,21 +99,21 @@ def explained(what: str, path: str, value: Any, remedy: str) -> tuple[str, str]:
         if want == TYPE_NAMES["array"] and not isinstance(value, dict):
             want = toml_text.TYPE_NAMES["array"]
         got = TYPE_NAMES.get(wrong_type[2], f"a {wrong_type[2]}")
-        what = f"expected {want}{_unit_of(path)}, got {got}{_shown(value)}"
+        problem = f"expected {want}{_unit_of(path)}, got {got}{_shown(value)}"
         if wrong_type[1] == "array" and isinstance(value, dict):
-            return what, "write its header in double brackets"
-        return what, _quoted_number(wrong_type[1], value) or remedy
-    limit = re.fullmatch(r"Expected `\w+` (>=|>|<=|<) (\S+)", what)
+            return problem, "write its header in double brackets"
+        return problem, _quoted_number(wrong_type[1], value) or remedy
+    limit = re.fullmatch(r"Expected `\w+` (>=|>|<=|<) (\S+)", problem)
     if limit:
         return f"{value} is out of range", f"must be {limit[1]} {limit[2]}{_unit_of(path)}"
-    if what.startswith(("Invalid enum value", "Invalid value")):
+    if problem.startswith(("Invalid enum value", "Invalid value")):
         return f"{value!r} is not one of the choices", remedy
-    if "0-9A-Fa-f" in what:
+    if "0-9A-Fa-f" in problem:
         return f"{value!r} is not bytes in hex digits", "use two digits a byte, as 0a ff"
-    if "matching regex" in what:
+    if "matching regex" in problem:
         return f"{value!r} is not a name", "use a-z, 0-9, - and _, at most 64 characters"
-    what = what.replace("`array`", "a list")
-    return what[:1].lower() + what[1:], remedy
+    problem = problem.replace("`array`", "a list")
+    return problem[:1].lower() + problem[1:], remedy
 
 
 def _of_a_file(key: str) -> str:
@@ -184,48 +184,48 @@ def _type_of(struct: type) -> msgspec.inspect.Type:
 
 def _type_at(raw: Any, path: str) -> msgspec.inspect.Type | None:
     """What a scenario may have at a key path; below tagged tables, these tables."""
-    found = _type_of(Scenario)
+    kind = _type_of(Scenario)
     for key, index in re.findall(r"([^.\[\]]+)|\[(\d+)\]", path):
-        found = _chosen(found, raw)
+        kind = _chosen(kind, raw)
         raw = value_at(raw, key or f"[{index}]")
-        if key and isinstance(found, msgspec.inspect.StructType):
-            fields = {field.encode_name: field.type for field in found.fields}
+        if key and isinstance(kind, msgspec.inspect.StructType):
+            fields = {field.encode_name: field.type for field in kind.fields}
             if key not in fields:
                 return None
-            found = fields[key]
-        if isinstance(found, msgspec.inspect.Metadata):
-            found = found.type
-        if not key and isinstance(found, msgspec.inspect.VarTupleType):
-            found = found.item_type
-    return found
+            kind = fields[key]
+        if isinstance(kind, msgspec.inspect.Metadata):
+            kind = kind.type
+        if not key and isinstance(kind, msgspec.inspect.VarTupleType):
+            kind = kind.item_type
+    return kind
 
 
-def _chosen(found: msgspec.inspect.Type, table: Any) -> msgspec.inspect.Type:
+def _chosen(kind: msgspec.inspect.Type, table: Any) -> msgspec.inspect.Type:
     """The type itself; where it is any plug-in's table, or of several kinds, that which the table names."""
-    if isinstance(found, msgspec.inspect.UnionType) and isinstance(table, dict):
-        structs = [option for option in found.types if isinstance(option, msgspec.inspect.StructType)]
+    if isinstance(kind, msgspec.inspect.UnionType) and isinstance(table, dict):
+        structs = [option for option in kind.types if isinstance(option, msgspec.inspect.StructType)]
         named = [
             struct for struct in structs if not struct.tag_field or table.get(struct.tag_field) == struct.tag
         ]
-        return named[0] if len(named) == 1 else found
-    if not isinstance(found, msgspec.inspect.CustomType):
-        return found
+        return named[0] if len(named) == 1 else kind
+    if not isinstance(kind, msgspec.inspect.CustomType):
+        return kind
     try:
-        return _type_of(struct_of(REGISTRIES[found.cls], table))
+        return _type_of(struct_of(REGISTRIES[kind.cls], table))
     except (ValueError, TypeError, AttributeError):  # no plug-in is named, or none can be used
-        return found
+        return kind
 
 
 def _structs_at(raw: Any, path: str) -> list[msgspec.inspect.StructType]:
     """The kinds of table that there may be at a key path: several where a key says which."""
-    found = _type_at(raw, path)
-    if found is not None:
-        found = _chosen(found, value_at(raw, path))
-    return [option for option in _options(found) if isinstance(option, msgspec.inspect.StructType)]
+    kind = _type_at(raw, path)
+    if kind is not None:
+        kind = _chosen(kind, value_at(raw, path))
+    return [option for option in _options(kind) if isinstance(option, msgspec.inspect.StructType)]
 
 
-def _options(found: msgspec.inspect.Type | None) -> tuple[msgspec.inspect.Type | None, ...]:
-    return found.types if isinstance(found, msgspec.inspect.UnionType) else (found,)
+def _options(kind: msgspec.inspect.Type | None) -> tuple[msgspec.inspect.Type | None, ...]:
+    return kind.types if isinstance(kind, msgspec.inspect.UnionType) else (kind,)
 
 
 def _keys_at(raw: Any, path: str) -> list[str]:
@@ -257,22 +257,22 @@ def _other_plugin(raw: Any, path: str, key: str) -> str:
 def _choices_at(raw: Any, path: str) -> str:
     """What a key may hold, if that is one of a few: words, numbers, or the kinds of its table."""
     above, _, key = path.rpartition(".")
-    found, table = _type_at(raw, path), _type_at(raw, above)
+    kind, table = _type_at(raw, path), _type_at(raw, above)
     if isinstance(table, msgspec.inspect.CustomType) and REGISTRIES[table.cls].key == key:
         choices = REGISTRIES[table.cls].names()
-    elif not (choices := _literals(found)):
+    elif not (choices := _literals(kind)):
         choices = [str(struct.tag) for struct in _structs_at(raw, above) if struct.tag_field == key]
     note = ": slots of a frame; each [[network.robot]] is a robot" if key == "robots" else ""
     return use_one_of(choices) + note if choices else ""
 
 
-def _literals(found: msgspec.inspect.Type | None) -> list[str]:
-    literals = [one for one in _options(found) if isinstance(one, msgspec.inspect.LiteralType)]
+def _literals(kind: msgspec.inspect.Type | None) -> list[str]:
+    literals = [option for option in _options(kind) if isinstance(option, msgspec.inspect.LiteralType)]
     return [str(value) for literal in literals for value in literal.values]
 
 
 def choices_of(struct: type[msgspec.Struct], key: str) -> str:
     """What a key of a struct may hold, if that is one of a few words or numbers."""
     fields = msgspec.structs.fields(struct)
-    found = [_literals(_type_of(field.type)) for field in fields if field.encode_name == key]
-    return use_one_of(found[0]) if found and found[0] else ""
+    literals = [_literals(_type_of(field.type)) for field in fields if field.encode_name == key]
+    return use_one_of(literals[0]) if literals and literals[0] else ""

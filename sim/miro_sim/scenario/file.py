@@ -50,7 +50,7 @@ class ReadText(msgspec.Struct, frozen=True):
         return self.source if self.tables is None else written(self.tables, self.origin, self.settings)
 
     def blamed(self, error: ScenarioError) -> ScenarioError:
-        """The same error in what somebody else reads in the scenario, naming the setting that it concerns."""
+        """An error of another reader of the scenario, naming the setting that it concerns."""
         return blamed(error, self.made, self.tables or {})
 
 
@@ -181,10 +181,10 @@ def _checked(
             )
             return ScenarioText(origin, "", tuple(settings), notes, raw, tuple(made), scenario=scenario)
         except ScenarioError as error:
-            found = drop_other_kind(error, made)
-            if found is None:
+            foreign = drop_other_kind(error, made)
+            if foreign is None:
                 raise blamed(error, made, raw) from error.__cause__
-            dropped.setdefault(found[0], []).append(found[1])
+            dropped.setdefault(foreign[0], []).append(foreign[1])
         except RecursionError:
             raise ScenarioError(origin, "", "nested too deeply", "tables have at most 5 levels") from None
 
@@ -194,11 +194,11 @@ def _converted(raw: dict[str, Any], origin: str) -> Scenario:
     from miro_sim.scenario.build import check_robots  # needs hot modules: not before the engine was chosen
 
     if "board" in raw and "network" in raw:
-        what = "is for a scenario of a board, and this one is for robots"
-        raise ScenarioError(origin, "board", what, "remove it")
+        problem = "is for a scenario of a board, and this one is for robots"
+        raise ScenarioError(origin, "board", problem, "remove it")
     if "board" in raw:
-        what = "the scenario is for a board, and this command takes robots"
-        raise ScenarioError(origin, "board", what, "`mirotwin run` and `mirotwin test` take it")
+        problem = "the scenario is for a board, and this command takes robots"
+        raise ScenarioError(origin, "board", problem, "`mirotwin run` and `mirotwin test` take it")
     with ScenarioError.at(origin, "variant"):
         complete = with_variant(raw) if "variant" in raw else raw
     complete = _with_profiles(complete, origin)
@@ -213,7 +213,7 @@ def _converted(raw: dict[str, Any], origin: str) -> Scenario:
 
 
 def _with_profiles(raw: dict[str, Any], origin: str) -> dict[str, Any]:
-    """The same with the keys of profiles in the radio tables; what has another shape is left alone."""
+    """The tables with the keys of profiles in the radio tables; a value of another shape stays."""
     networks = raw.get("network")
     if not isinstance(networks, list):
         return raw
@@ -245,22 +245,22 @@ def for_session(source: str, settings: Sequence[str] = ()) -> ScenarioText:
 
 
 def lasting(own: ScenarioText) -> ScenarioText:
-    """That of `for_session` as `live_scenario` makes it."""
+    """The scenario of `for_session` with a day to run and silent hosts."""
     if own.scenario.step:
-        what = "a live session does no steps"
-        raise ScenarioError(own.origin, "step", what, "run them by `mirotwin test`, or remove them")
+        problem = "a live session does no steps"
+        raise ScenarioError(own.origin, "step", problem, "run them by `mirotwin test`, or remove them")
     return load(own.origin, (*own.settings, *live_settings(own.scenario)))
 
 
 def live_settings(scenario: Scenario) -> list[str]:
     """The settings that make a scenario last a day, with hosts that send nothing."""
-    found = [f"duration_s={LONGEST_S!r}"]
+    settings = [f"duration_s={LONGEST_S!r}"]
     for index, network in enumerate(scenario.networks):
-        found.append(f'network.{index}.host="silent"')
+        settings.append(f'network.{index}.host="silent"')
         for place, robot in enumerate(network.robot):
             if getattr(robot.reference, "drive_s", 0.0) is None:  # it would move all the time
-                found.append(f"network.{index}.robot.{place}.reference.drive_s={scenario.duration_s!r}")
-    return found
+                settings.append(f"network.{index}.robot.{place}.reference.drive_s={scenario.duration_s!r}")
+    return settings
 
 
 def written(raw: dict[str, Any], origin: str, settings: Sequence[str]) -> str:

@@ -193,7 +193,7 @@ def scenario_of(tables: dict[str, Any]) -> Scenario:
 
 
 def without_expectations(scenario: Scenario | BoardScenario) -> Scenario | BoardScenario:
-    """The same scenario, of which nothing is expected, without steps: all that a world depends on."""
+    """A copy without expectations and steps: all that a world depends on."""
     if isinstance(scenario, BoardScenario):
         return msgspec.structs.replace(scenario, expect={}, step=())
     networks = []

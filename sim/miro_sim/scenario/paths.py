@@ -50,18 +50,18 @@ def put_paths(raw: Table, origin: str, in_file: bool = True) -> bool:
 
     Tables that stand in no file may name none (`in_file`, and `origin` ""). Raises ScenarioError.
     """
-    found = False
+    changed = False
     for index, network in enumerate(tables_in(raw, "network")):
         for place, robot in enumerate(tables_in(network, "robot")):
             reference = table_of(robot.get("reference"))
             if FILE in reference and reference.get("kind") in (None, *REFERENCES.own):
                 key = f"network[{index}].robot[{place}].reference.{FILE}"
                 if not (in_file and origin):
-                    what = "is read with a scenario's file only"
-                    raise ScenarioError(origin, key, what, f"write reference = {{ {FILE} = .. }} into one")
+                    problem = "is read with a scenario's file only"
+                    raise ScenarioError(origin, key, problem, f"write reference = {{ {FILE} = .. }} into one")
                 robot["reference"] = _with_points(reference, origin, key)
-                found = True
-    return found
+                changed = True
+    return changed
 
 
 def _with_points(reference: Table, origin: str, key: str) -> Table:
@@ -93,7 +93,7 @@ def _read(text: str, path: str) -> tuple[str, list[Any], list[int]]:
     lines = [(number, line) for number, line in numbered if line.strip() and line.lstrip()[0] != "#"]
     if not lines:
         raise ScenarioError(path, "", "holds no path", _HEADS)
-    separator = next((one for one in ";\t" if one in lines[0][1]), ",")
+    separator = next((mark for mark in ";\t" if mark in lines[0][1]), ",")
     rows = [
         [cell.strip() for cell in row] for row in csv.reader((line for _, line in lines), delimiter=separator)
     ]
@@ -105,8 +105,8 @@ def _read(text: str, path: str) -> tuple[str, list[Any], list[int]]:
     points: list[Any] = []
     for (number, _), row in zip(lines[1:], rows[1:], strict=True):
         if len(row) != len(keys):
-            what = f"has {len(row)} values under {len(keys)} columns"
-            raise ScenarioError(path, f"line {number}", what, "one value for each column")
+            problem = f"has {len(row)} values under {len(keys)} columns"
+            raise ScenarioError(path, f"line {number}", problem, "one value for each column")
         point = {
             key: _value(cell, key, path, number)
             for key, cell in zip(keys, row, strict=True)
@@ -152,9 +152,9 @@ def _check(table: Table, path: str, lines: Sequence[int]) -> None:
         msgspec.convert(table, struct)
     except msgspec.ValidationError as error:
         wrong = value_error(path, table, str(error))
-        place, what = (
+        place, problem = (
             _POINT.sub(lambda match: f"line {lines[int(match[1])]}{': ' * bool(match[2])}", text)
             for text in (f"{wrong.place}", wrong.what)
         )
         if f"{wrong.place}".startswith(POINTS):
-            raise ScenarioError(path, place, what, wrong.remedy) from None
+            raise ScenarioError(path, place, problem, wrong.remedy) from None

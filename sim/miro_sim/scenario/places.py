@@ -47,15 +47,15 @@ def robot_problem(
     assert isinstance(law, LawParameters)
     off = _off_pitch(start)
     if off is not None:
-        axis, what = off
-        what = f"the robot starts off the pitch: {what}"
+        axis, reason = off
+        reason = f"the robot starts off the pitch: {reason}"
         if _off_pitch(reference.at(0.0).posture) is not None:
-            return "reference", what, "begin the reference elsewhere"
-        return f"start_error_{axis}_cm", what, "start nearer to the reference"
+            return "reference", reason, "begin the reference elsewhere"
+        return f"start_error_{axis}_cm", reason, "start nearer to the reference"
     if lens is not None and not _sees_top(lens, start):
         at = f"({100.0 * start.x_m:.1f}, {100.0 * start.y_m:.1f}) cm"
-        what = f"the robot starts outside the camera's view, at {at}"
-        return "start_error_x_cm", what, "start it elsewhere, or change camera.lens"
+        reason = f"the robot starts outside the camera's view, at {at}"
+        return "start_error_x_cm", reason, "start it elsewhere, or change camera.lens"
     on_s = 0.0
     whole_path = []
     for t_s in _instants(reference, duration_s):
@@ -63,11 +63,11 @@ def robot_problem(
         whole_path.append((t_s, place))
         off = _off_pitch(place.posture)
         if off is not None:
-            what = f"leaves the pitch after {t_s:.2f} s of {duration_s:g} s: {off[1]}"
+            reason = f"leaves the pitch after {t_s:.2f} s of {duration_s:g} s: {off[1]}"
             remedy = f"let it stop before, drive_s = {int(100.0 * on_s) / 100.0:g}, or slow it down"
             if not hasattr(parameters, "drive_s"):
                 remedy = f"choose other parameters for it, or duration_s = {int(100.0 * on_s) / 100.0:g}"
-            return "reference", what, remedy if on_s else "start it elsewhere"
+            return "reference", reason, remedy if on_s else "start it elsewhere"
         on_s = t_s
     frames = ((t_s, reference.at(t_s)) for t_s in _frames(reference, duration_s))
     problem = origin_problem(whole_path, law) or limits_problem(frames, law)
@@ -135,20 +135,20 @@ def camera_problem(camera: Camera, networks: int) -> Problem | None:
     except ValueError as error:
         return "camera.lens", str(error), "use a longer focal_px, or less tilt"
     if not (pitch.LEFT_M <= lens.x_m <= pitch.RIGHT_M and pitch.BOTTOM_M <= lens.y_m <= pitch.TOP_M):
-        what = f"hangs at ({100.0 * lens.x_m:.0f}, {100.0 * lens.y_m:.0f}) cm, beside the pitch"
-        return "camera.lens", what, "hang it above the pitch, and tilt it"
+        problem = f"hangs at ({100.0 * lens.x_m:.0f}, {100.0 * lens.y_m:.0f}) cm, beside the pitch"
+        return "camera.lens", problem, "hang it above the pitch, and tilt it"
     for x_m, y_m in _CORNERS:
         if not _sees(lens, x_m, y_m, 0.0) or _pixel(lens, x_m, y_m, ROBOT_HEIGHT_M) is None:
-            what = f"does not see the pitch's corner ({100.0 * x_m:.0f}, {100.0 * y_m:.0f}) cm"
-            return "camera.lens", what, _REMEDY
+            problem = f"does not see the pitch's corner ({100.0 * x_m:.0f}, {100.0 * y_m:.0f}) cm"
+            return "camera.lens", problem, _REMEDY
     if isinstance(camera, PixelCamera) and networks > len(TEAMS):
-        what = f"{networks} networks, but patches have the colours of {len(TEAMS)} teams"
-        return "camera.kind", what, "use gaussian or geometric, or fewer networks"
+        problem = f"{networks} networks, but patches have the colours of {len(TEAMS)} teams"
+        return "camera.kind", problem, "use gaussian or geometric, or fewer networks"
     return None
 
 
 def _sees_top(lens: Lens, start: Posture) -> bool:
-    """Whether the camera sees the whole top of a robot there."""
+    """True if the camera sees the whole top of a robot there."""
     reach = pitch.reach_m(start.theta_rad)
     xs, ys = (start.x_m - reach, start.x_m + reach), (start.y_m - reach, start.y_m + reach)
     return all(_sees(lens, x_m, y_m, ROBOT_HEIGHT_M) for x_m in xs for y_m in ys)

@@ -37,8 +37,8 @@ def plugin_of(kind: type, table: object) -> object:
     except PluginError as error:
         raise PluginTableError(f"{error} - at `$.{registry.key}`") from error
     except (Exception, SystemExit) as error:  # from the plug-in's own check of its parameters
-        what = f"{registry.word} {keys.get(registry.key)!r} cannot check its parameters: {raised(error)}"
-        raise PluginTableError(what) from error
+        problem = f"{registry.word} {keys.get(registry.key)!r} cannot check its parameters: {raised(error)}"
+        raise PluginTableError(problem) from error
 
 
 def struct_of(registry: Registry[Any], keys: dict[str, Any]) -> type[msgspec.Struct]:
@@ -49,8 +49,8 @@ def struct_of(registry: Registry[Any], keys: dict[str, Any]) -> type[msgspec.Str
         name = msgspec.convert(keys.get(registry.key, registry.default), str)
     except msgspec.ValidationError as error:
         raise msgspec.ValidationError(f"{error} - at `$.{registry.key}`") from None
-    found: type[msgspec.Struct] = registry.find(name)
-    return found
+    struct: type[msgspec.Struct] = registry.find(name)
+    return struct
 
 
 def plugins_used(
@@ -97,9 +97,9 @@ def full_message(error: msgspec.ValidationError) -> str:
     if not isinstance(cause, PluginTableError):
         return message
     below = str(cause)
-    what, _, path = (
+    problem, _, path = (
         below.rpartition(" - at `$") if re.search(r" - at `\$[^`]*`\Z", below) else (below, "", "`")
     )
     above = message[len(below) :]
     outer = above[len(" - at `") : -1] if above else "$"
-    return f"{what} - at `{outer}{path}"
+    return f"{problem} - at `{outer}{path}"

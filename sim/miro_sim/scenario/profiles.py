@@ -57,14 +57,15 @@ def _check_slicer(names: list[str], radio: Table, merged: Table) -> None:
     slicers = [name for name in names if "slicer" in keys_of(name)]
     if not slicers or "eb_n0_db" in merged:
         return
-    what = f"{slicers[-1]} needs eb_n0_db, and"
+    problem = f"{slicers[-1]} needs eb_n0_db, and"
     if "bit_error_rate" in radio:
         raise Refused(
-            f"{what} bit_error_rate is given in its place", "leave one of them out, or give eb_n0_db instead"
+            f"{problem} bit_error_rate is given in its place",
+            "leave one of them out, or give eb_n0_db instead",
         )
     taker = [name for name in names if "bit_error_rate" in keys_of(name)][-1]
     raise Refused(
-        f"{what} {taker} sets bit_error_rate in its place",
+        f"{problem} {taker} sets bit_error_rate in its place",
         f"leave one of them out, name {slicers[-1]} after {taker}, or give eb_n0_db",
     )
 

@@ -55,7 +55,7 @@ class Setting(msgspec.Struct, frozen=True):
         return _option(self.text, self.option)
 
     def concerns(self, path: str) -> bool:
-        """Whether an error at this path may be the setting's."""
+        """True if an error at this path may be the setting's."""
         ours = [key_path for key_path in (self.path, self.table) if key_path]
         return any(_inside(path, key_path) for key_path in ours) or _inside(self.path, path)
 
@@ -78,14 +78,14 @@ def _inside(path: str, above: str) -> bool:
 
 def in_text(table: Table, above: str = "") -> list[str]:
     """The settings KEY=VALUE that a table of them says; a table inside it stands for its keys, if these are words."""
-    found: list[str] = []
+    lines: list[str] = []
     for key, value in table.items():
         path = f"{above}{key}"
         if isinstance(value, dict) and all(_WORD.fullmatch(inner) for inner in value):
-            found += in_text(value, f"{path}.")
+            lines += in_text(value, f"{path}.")
         else:
-            found.append(f"{path}={_inline(value)}")
-    return found
+            lines.append(f"{path}={_inline(value)}")
+    return lines
 
 
 def _inline(value: Any) -> str:
@@ -93,7 +93,7 @@ def _inline(value: Any) -> str:
     import tomli_w  # only tables of settings need it
 
     if isinstance(value, dict):  # the names of pins are keys with dots
-        inner = (f"{json.dumps(key)} = {_inline(one)}" for key, one in value.items())
+        inner = (f"{json.dumps(key)} = {_inline(entry)}" for key, entry in value.items())
         return f"{{ {', '.join(inner)} }}"
     return tomli_w.dumps({"x": value}).removeprefix("x = ").rstrip()
 
@@ -116,8 +116,8 @@ def _of_all(raw: Table, text: str) -> list[str]:
     table, key = _OF_ALL[word], TABLES[_OF_ALL[word]]
     robots = {
         f"network.{network}.robot.{place}": robot
-        for network, one in enumerate(tables_in(raw, "network"))
-        for place, robot in enumerate(tables_in(one, "robot"))
+        for network, team in enumerate(tables_in(raw, "network"))
+        for place, robot in enumerate(tables_in(team, "robot"))
     }
     if any(table_of(robot.get(table)).get(key) == name for robot in robots.values()):
         return []
@@ -194,9 +194,9 @@ class _Path:
         index, *rest = keys
         number = int(index[:9])
         if number >= len(at):
-            what = f"{path} has {len(at)} {'entry' if len(at) == 1 else 'entries'}, numbered from 0"
+            problem = f"{path} has {len(at)} {'entry' if len(at) == 1 else 'entries'}, numbered from 0"
             raise Refused(
-                what,
+                problem,
                 "give the whole list to add one, or add it to the file that `mirotwin scenarios show NAME` prints",
             )
         key_path = f"{path}[{number}]"
@@ -207,7 +207,7 @@ class _Path:
 
 
 def _another_kind(table: Table, key: str, value: Any) -> bool:
-    """Whether this table has been of another kind than `value`; one that does not say its kind has the default."""
+    """True if this table has been of another kind than `value`; one that does not say its kind has the default."""
     return table[key] != value if key in table else value not in _DEFAULTS
 
 
@@ -229,11 +229,11 @@ def drop_other_kind(error: ScenarioError, settings: Sequence[Setting]) -> tuple[
 def _deeper(key_path: str, setting: Setting, raw: Table) -> str:
     """Where a key stands that was looked for too far above: at the top, in a network or in a robot."""
     key = key_path.rpartition(".")[2]
-    found = re.search(rf"(?:^|\.){re.escape(key)}([.=\[].*)", setting.text, re.DOTALL)
-    if found is None or not re.fullmatch(r"(network\[\d+\]\.)?(robot\[\d+\]\.)?[^.\[\]]+", key_path):
+    match = re.search(rf"(?:^|\.){re.escape(key)}([.=\[].*)", setting.text, re.DOTALL)
+    if match is None or not re.fullmatch(r"(network\[\d+\]\.)?(robot\[\d+\]\.)?[^.\[\]]+", key_path):
         return ""
     network, robot = _robot_near(key_path, raw)
-    rest = _with_tag(key, found[1])
+    rest = _with_tag(key, match[1])
     if key == "robot":
         path = robot if not re.match(r"\.\d|\[", rest) else f"{network}.robot"
     elif key == LAWS.key:
@@ -270,7 +270,7 @@ def _robot_near(key_path: str, raw: Table) -> tuple[str, str]:
 
 
 def blamed(error: ScenarioError, settings: Sequence[Setting], raw: Table) -> ScenarioError:
-    """The same error, naming the setting that it concerns; all settings, where the scenario failed with them.
+    """The error, naming the setting that it concerns, or all settings if only together they failed.
 
     `raw`: the tables in which they were made.
     """
@@ -291,5 +291,5 @@ def blamed(error: ScenarioError, settings: Sequence[Setting], raw: Table) -> Sce
         remedy = f"write {_option(key + tagged, setting.option)}"
     if not remedy and error.what.startswith("expected a string"):
         remedy = f"to give text, write --set '{key}=\"..\"'"
-    what = error.what if key_path == setting.path else f"{key_path}: {error.what}"
-    return ScenarioError(f"{error.path}", setting.place, what, remedy)
+    problem = error.what if key_path == setting.path else f"{key_path}: {error.what}"
+    return ScenarioError(f"{error.path}", setting.place, problem, remedy)

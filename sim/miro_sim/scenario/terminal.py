@@ -71,11 +71,11 @@ def read_pins(text: str, path: str, crystal_hz: int = TICKS_PER_SECOND) -> tuple
         if event.tick > _LATEST_TICK:
             raise BadInput(path, number, f"tick {event.tick} is too late", f"use ticks up to {_LATEST_TICK}")
         if events and event.tick < events[-1].tick:
-            what = f"tick {event.tick} comes after tick {events[-1].tick}"
-            raise BadInput(path, number, what, "sort the lines by tick")
+            problem = f"tick {event.tick} comes after tick {events[-1].tick}"
+            raise BadInput(path, number, problem, "sort the lines by tick")
         if last.get((event.port, event.bit)) == event.tick:
-            what = f"P{event.port}.{event.bit} has a level at tick {event.tick} already"
-            raise BadInput(path, number, what, "leave one line out")
+            problem = f"P{event.port}.{event.bit} has a level at tick {event.tick} already"
+            raise BadInput(path, number, problem, "leave one line out")
         last[event.port, event.bit] = event.tick
         events.append(event)
     return tuple(events)

@@ -49,7 +49,7 @@ def impose(raw: Table, name: object) -> None:
 
 
 def with_variant(raw: Table) -> Table:
-    """The same tables with what the variant of the file says where the file says nothing. Raises Refused.
+    """The tables with the values of the file's variant where the file gives none. Raises Refused.
 
     A camera of another kind, and a radio with a profile, are what the file says.
     """

@@ -13,9 +13,9 @@ cdef class Bodies:
 
     cpdef start_again(self, list touching)
     cpdef start_at(self, long long tick)
-    @cython.locals(robot=Robot, one=Robot, other=Robot, index=Py_ssize_t, closing_m_s=double)
+    @cython.locals(robot=Robot, first=Robot, other=Robot, index=Py_ssize_t, closing_m_s=double)
     cpdef begin(self, long long tick, long long until_tick)
-    @cython.locals(one=Robot, other=Robot, index=Py_ssize_t, tick='long long', closing_m_s=double, known=bint)
+    @cython.locals(first=Robot, other=Robot, index=Py_ssize_t, tick='long long', closing_m_s=double, known=bint)
     cpdef list look(self)
 
 

@@ -27,7 +27,7 @@ class Bodies:
     def __init__(self, robots: Sequence[Robot]) -> None:
         self.robots = list(robots)
         self.pairs: list[tuple[Robot, Robot, float]] = [
-            (one, other, _most_m_s(one) + _most_m_s(other)) for one, other in combinations(robots, 2)
+            (first, other, _most_m_s(first) + _most_m_s(other)) for first, other in combinations(robots, 2)
         ]
         self.looks: list[tuple[int, int]] = []  # in this piece: index of a pair, and its first tick
         self.start_again([])
@@ -42,9 +42,9 @@ class Bodies:
         """Takes those that touch at `tick` for touching already: only what begins later is reported."""
         self.start_again(
             [
-                (one, other)
-                for one, other, _ in self.pairs
-                if touch(one.drive.pose_at(tick), other.drive.pose_at(tick))
+                (first, other)
+                for first, other, _ in self.pairs
+                if touch(first.drive.pose_at(tick), other.drive.pose_at(tick))
             ]
         )
 
@@ -57,13 +57,13 @@ class Bodies:
         if until_tick < self.next_tick:
             return
         poses = {robot: robot.drive.pose_at(tick) for robot in self.robots}
-        for index, (one, other, closing_m_s) in enumerate(self.pairs):
+        for index, (first, other, closing_m_s) in enumerate(self.pairs):
             if self.next_ticks[index] <= until_tick:
-                look_tick = next_look(tick, poses[one], poses[other], closing_m_s)
+                look_tick = next_look(tick, poses[first], poses[other], closing_m_s)
                 self.next_ticks[index] = look_tick
                 if look_tick <= until_tick:
                     self.looks.append((index, look_tick))
-                    for robot in (one, other):
+                    for robot in (first, other):
                         robot.note_from(min(look_tick, robot.grid_tick))
         self.next_tick = min(self.next_ticks)
 
@@ -71,16 +71,16 @@ class Bodies:
         """Which pairs have begun to touch in the piece, and when; in the order of time."""
         touches = []
         for index, tick in self.looks:
-            one, other, closing_m_s = self.pairs[index]
-            while tick < min(one.grid_tick, other.grid_tick):  # both have noted it
-                pose, other_pose = _noted(one, tick), _noted(other, tick)
-                known = (one, other) in self.touching
+            first, other, closing_m_s = self.pairs[index]
+            while tick < min(first.grid_tick, other.grid_tick):  # both have noted it
+                pose, other_pose = _noted(first, tick), _noted(other, tick)
+                known = (first, other) in self.touching
                 if touch(pose, other_pose) != known:
                     if known:
-                        self.touching = [pair for pair in self.touching if pair != (one, other)]
+                        self.touching = [pair for pair in self.touching if pair != (first, other)]
                     else:
-                        self.touching = [*self.touching, (one, other)]
-                        touches.append((tick, one, other))
+                        self.touching = [*self.touching, (first, other)]
+                        touches.append((tick, first, other))
                 tick = next_look(tick, pose, other_pose, closing_m_s)
             self.next_ticks[index] = tick
         if self.looks:

@@ -80,12 +80,14 @@ class Bus(Wire):
             if transceiver is not None:
                 transceiver.join(self.names, slot, self.delay_ticks)
             if device.board.drives_rxd or (wire_part is not None and transceiver is None):
-                what = "a part drives P3.0 (RXD), or stands between it and the line"
-                raise BadInput("", f"board.{self.names[slot]}", what, "wire P3.0 to the line alone")
+                problem = "a part drives P3.0 (RXD), or stands between it and the line"
+                raise BadInput("", f"board.{self.names[slot]}", problem, "wire P3.0 to the line alone")
         if None in self.transceivers and (len(self.devices) > 2 or self.transceivers != [None, None]):
             missing = self.names[self.transceivers.index(None)]
-            what = "has no RS485 transceiver; only two boards, both without one, can be wired to each other"
-            raise BadInput("", f"board.{missing}", what, 'give each board a part = "rs485"')
+            problem = (
+                "has no RS485 transceiver; only two boards, both without one, can be wired to each other"
+            )
+            raise BadInput("", f"board.{missing}", problem, 'give each board a part = "rs485"')
         self.levels = self.given = (2 << len(self.devices)) - 1
         self.driving = 0 if self.transceivers[0] is not None else (1 << len(self.devices)) - 1
         self._exchange(0)
@@ -188,8 +190,8 @@ class Bus(Wire):
 
     def _check_rxd_is_free(self) -> None:
         if self.transceivers[0] is None:
-            what = "two boards are wired to each other, so a PC can listen and not send"
-            raise ValueError(f"net{self.index}: {what}; give each a part rs485")
+            problem = "two boards are wired to each other, so a PC can listen and not send"
+            raise ValueError(f"net{self.index}: {problem}; give each a part rs485")
 
     def _takes(self, first_tick: int, end_tick: int, characters: int) -> bool:
         for transceiver in self.transceivers:

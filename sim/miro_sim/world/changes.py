@@ -51,7 +51,7 @@ def find_pin(spec: BoardSpec, netlist: Netlist, name: str) -> PinPlace:
             if (other, about.keys.PINS[number].name) == (part, pin) and place.net >= 0:
                 return PinPlace(place.net, -1, place.inverted)
     known = names_of_pins(spec, netlist)
-    remedy = did_you_mean(name, known) or f"there are P0.0 to P3.7{''.join(f', {one}' for one in known[32:])}"
+    remedy = did_you_mean(name, known) or f"there are P0.0 to P3.7{''.join(f', {key}' for key in known[32:])}"
     raise ValueError(f"pin: {name!r} is no pin, net or part's pin of this board; {remedy}")
 
 

@@ -81,7 +81,7 @@ class Condition(
         return PC
 
     def met_by(self, event: Event) -> bool:
-        """Whether this event, of the network and slot that are meant, fulfils the condition."""
+        """True if this event, of the network and slot that are meant, fulfils the condition."""
         return event.what == self.what and all(
             getattr(self, field) in (None, value_of(event)) for field, value_of in self.OF_EVENT.items()
         )
@@ -213,8 +213,8 @@ class Command(AtRobot, frozen=True, kw_only=True, tag="command"):
         try:
             bytes.fromhex(self.hex or "")
         except ValueError:
-            what = f"hex: {self.hex!r} are not bytes; write pairs of hex digits, as in '00 05'"
-            raise ValueError(what) from None
+            problem = f"hex: {self.hex!r} are not bytes; write pairs of hex digits, as in '00 05'"
+            raise ValueError(problem) from None
 
     def met_by(self, event: Event) -> bool:
         return super().met_by(event) and (self.hex is None or event.data == bytes.fromhex(self.hex))
@@ -240,9 +240,9 @@ class WheelSpeeds(AtRobot, frozen=True, kw_only=True, tag="wheels"):
         return event.what == "true"
 
     def predicate(self, robot: Any) -> bool:
-        """Whether the wheels are so fast now."""
+        """True if the wheels are so fast now."""
         sides = zip((self.left_m_s, self.right_m_s), speeds_of(robot), strict=True)
-        return all(wanted is None or abs(found - wanted) <= self.tolerance_m_s for wanted, found in sides)
+        return all(wanted is None or abs(speed - wanted) <= self.tolerance_m_s for wanted, speed in sides)
 
 
 def speeds_of(robot: Robot) -> tuple[float, float]:
@@ -256,7 +256,7 @@ class Followed(AtRobot, frozen=True, kw_only=True):
 
     SUBJECTS: ClassVar[tuple[Kind, ...]] = ("board",)
     LASTS: ClassVar[bool] = False
-    """Whether it is true for a time: then a step may `hold` it."""
+    """True if it is true for a time: then a step may `hold` it."""
     FOLLOWER: ClassVar[Any]
 
     @property
@@ -264,7 +264,7 @@ class Followed(AtRobot, frozen=True, kw_only=True):
         raise NotImplementedError
 
     def fits(self, measured: Any) -> bool:
-        """Whether a measurement is one that is wanted. Raises ValueError for one that it cannot be compared with."""
+        """True if a measurement is one that is wanted. Raises ValueError for one that it cannot be compared with."""
         raise NotImplementedError
 
     def follower(self, source: object, flip: int, clock: int, tick: int, level: Any) -> followers.Follower:
@@ -450,7 +450,7 @@ def unknown_robot_pin(name: str) -> str:
 
 
 def within(measured: Any, least: float | None, most: float | None) -> bool:
-    """Whether a number is in a range that may be open."""
+    """True if a number is in a range that may be open."""
     return (least is None or measured >= least) and (most is None or measured <= most)
 
 

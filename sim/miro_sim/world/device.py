@@ -105,16 +105,16 @@ class Device:
 
     # Hardware faults
 
-    def check_fault(self, what: str) -> None:
+    def check_fault(self, fault: str) -> None:
         """Raises ValueError for what is no fault, and for one that this board cannot have."""
-        if not fault_text(what).startswith("flip "):
+        if not fault_text(fault).startswith("flip "):
             raise ValueError(
-                f'{what!r} is a fault of a robot; put a value of the part, as eyes.echo = "none"'
+                f'{fault!r} is a fault of a robot; put a value of the part, as eyes.echo = "none"'
             )
 
-    def break_hardware(self, what: str) -> None:
+    def break_hardware(self, fault: str) -> None:
         """Does the fault, between two instructions: a bit of RAM turns over."""
-        flip_bit(self.board.cpu, what.split()[1])
+        flip_bit(self.board.cpu, fault.split()[1])
 
     # Pins
 

@@ -149,7 +149,11 @@ class HostLog:
             some = [(number, self.kept[number - first]) for number in range(max(serial, first), self.end)]
         else:
             some = list(takewhile(lambda numbered: numbered[0] >= serial, reversed(self.rare)))[::-1]
-        return [(number, self._event(one)) for number, one in some if kinds is None or _kind(one) in kinds]
+        return [
+            (number, self._event(record))
+            for number, record in some
+            if kinds is None or _kind(record) in kinds
+        ]
 
     def _event(self, record: Event | Transmission | Received | Symbol) -> Event:
         if isinstance(record, Event):
@@ -252,13 +256,13 @@ class Cursor:
 
 
 def _event(tick: int, kind: int, code: int, value: int, data: bytes, network: int, slot: int) -> Event:
-    what = _KINDS[kind]
-    if what == "command":
+    word = _KINDS[kind]
+    if word == "command":
         side, opcode = SIDES[code >> 8], code & 0xFF
-        return Event(tick=tick, what=what, network=network, slot=slot, side=side, opcode=opcode, data=data)
-    if what in ("start_lost", "wheel_lost"):
-        return Event(tick=tick, what=what, network=network, slot=slot, side=SIDES[code])
-    if what in ("fault", "reached", "ended"):
-        return Event(tick=tick, what=what, network=network, slot=slot, value=code, address=value)
-    good = what != "received" or code == 1
-    return Event(tick=tick, what=what, network=network, slot=slot, value=value, good_stop=good)
+        return Event(tick=tick, what=word, network=network, slot=slot, side=side, opcode=opcode, data=data)
+    if word in ("start_lost", "wheel_lost"):
+        return Event(tick=tick, what=word, network=network, slot=slot, side=SIDES[code])
+    if word in ("fault", "reached", "ended"):
+        return Event(tick=tick, what=word, network=network, slot=slot, value=code, address=value)
+    good = word != "received" or code == 1
+    return Event(tick=tick, what=word, network=network, slot=slot, value=value, good_stop=good)

@@ -74,7 +74,7 @@ class Outbox:
         self.dropped = 0
 
     def __repr__(self) -> str:
-        waiting = [(one.sent.tick, one.sent.data.hex(" ")) for one in self.waiting]
+        waiting = [(entry.sent.tick, entry.sent.data.hex(" ")) for entry in self.waiting]
         return f"Outbox({waiting}, dropped={self.dropped})"
 
     def post(self, sent: Transmission, free_tick: int) -> bool:
@@ -82,7 +82,7 @@ class Outbox:
 
         `free_tick`: when the last transmission on the air is over.
         """
-        if sent.tick < free_tick or [one for one in self.waiting if self._overlap(one.sent, sent)]:
+        if sent.tick < free_tick or [entry for entry in self.waiting if self._overlap(entry.sent, sent)]:
             self.dropped += 1
             return False
         self.waiting.append(Waiting(sent, STATION))
@@ -124,7 +124,7 @@ class Outbox:
         count = 0
         while count < len(self.waiting) and self.waiting[count].sent.tick < until_tick + self.lead_ticks:
             count += 1
-        taken = [one.sent for one in self.waiting[:count]]
+        taken = [entry.sent for entry in self.waiting[:count]]
         del self.waiting[:count]
         return taken
 

@@ -82,12 +82,12 @@ class Robot(Device):
         """Of the left LM629."""
         return self.board.left.sample_tick
 
-    def check_fault(self, what: str) -> None:
-        fault_text(what)
+    def check_fault(self, fault: str) -> None:
+        fault_text(fault)
 
-    def break_hardware(self, what: str) -> None:
-        word, *values = what.split()
-        break_board(self.board, what)
+    def break_hardware(self, fault: str) -> None:
+        word, *values = fault.split()
+        break_board(self.board, fault)
         if word == "encoder":
             encoder = self.drive.left_encoder if values[0] == "left" else self.drive.right_encoder
             level_a, level_b = ENCODERS[values[1]]
@@ -95,7 +95,7 @@ class Robot(Device):
         # The network has broken the wire to RXD.
 
     def is_whole(self) -> bool:
-        """Whether no encoder and no LM629 is broken now."""
+        """True if no encoder and no LM629 is broken now."""
         broken = self.board.left.port.broken or self.board.right.port.broken
         left, right = self.drive.left_encoder, self.drive.right_encoder
         held = left.held_a >= 0 or left.held_b >= 0 or right.held_a >= 0 or right.held_b >= 0

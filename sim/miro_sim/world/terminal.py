@@ -124,7 +124,7 @@ class SerialInput:
 
     @property
     def waits_for_receiver(self) -> bool:
-        """Whether the first piece begins when the receiver is switched on."""
+        """True if the first piece begins when the receiver is switched on."""
         return bool(self.pieces) and self.fed == 0 and not self.waiting_for
 
     def feed(self) -> int:
@@ -150,12 +150,12 @@ class SerialInput:
         return end if self.live or self.pieces else now + _IDLE_SLICE
 
     def _receiving(self) -> bool:
-        """Whether the receiver is on, in a mode that takes characters."""
+        """True if the receiver is on, in a mode that takes characters."""
         control = self.cpu.sfr(_SCON)
         return bool(control & _REN and control & (_SM0 | _SM1))
 
     def _listening(self, now: int, receiving: bool, polling: bool) -> bool:
-        """Whether the next character may be sent, as far as the program has a say in it."""
+        """True if the next character may be sent, as far as the program has a say in it."""
         if not self.baud and not self.bit_ticks:
             return False
         condition = self.fed == 0 and self.pieces[0].has_condition

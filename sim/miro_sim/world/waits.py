@@ -40,13 +40,13 @@ class WaitExpired(TimeoutError):
         tick: int,
         why: str,
         seen: Sequence[Event],
-        found: str = "",
+        state: str = "",
     ) -> None:
         self.conditions = tuple(conditions)
         self.begun_tick = begun_tick
         self.tick = tick
         self.seen = list(seen)
-        self.found = found
+        self.found = state
         wanted = " or ".join(map(str, conditions))
         last = (
             f"; the last of {len(self.seen)} events: {self.seen[-1]}" if self.seen else "; nothing happened"
@@ -170,8 +170,8 @@ class Waits:
 
     def _inspectors(self) -> list[Inspector]:
         """Those with watchers that have to see each instruction once."""
-        found = [device.board.cpu.inspector for line in self.world.lines for device in line.devices]
-        return [one for one in found if isinstance(one, Inspector) and one.once]
+        inspectors = [device.board.cpu.inspector for line in self.world.lines for device in line.devices]
+        return [inspector for inspector in inspectors if isinstance(inspector, Inspector) and inspector.once]
 
     def _again_to(self, watch: Watch, before: Before, tick: int) -> None:
         """Goes back and runs the piece again, to `tick`."""

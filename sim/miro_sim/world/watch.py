@@ -101,7 +101,7 @@ class Watch:
         self._close_pins()
 
     def wants(self, event: Event) -> bool:
-        """Whether one of the conditions is met by `event`."""
+        """True if one of the conditions is met by `event`."""
         for robot_id, condition in self.conditions:
             if (event.network, event.slot) == robot_id and condition.met_by(event):
                 return True
@@ -177,14 +177,14 @@ class Watch:
                 place = (event.network, event.slot, event.pin)
                 pins += [
                     (event.tick, number, event.value)
-                    for number, one in enumerate(self.tapped)
-                    if one == place
+                    for number, tap in enumerate(self.tapped)
+                    if tap == place
                 ]
             elif event.what == "heard":
                 source = event.network, event.slot
                 text.append((event.tick, source, event.value))
                 serials[event.tick, source] = key[3]
-        found: list[Entry] = []
+        matches: list[Entry] = []
         tick = self.world.tick
         for number, (condition, robot_id, follower, changes) in enumerate(self.followers):
             new = text if isinstance(condition, Text) else pins
@@ -195,23 +195,23 @@ class Watch:
                 self.read[number] = max(self.read[number], log.first) + len(new)
             for when, measured in follower.feed(new, tick):
                 serial = serials.get((when, follower.source), FOLLOWED + number)
-                found.append(((when, *robot_id, serial), _event(condition, when, robot_id, measured)))
-        return found
+                matches.append(((when, *robot_id, serial), _event(condition, when, robot_id, measured)))
+        return matches
 
     def save(self) -> Any:
         """Where the followers are, to go back to with `load`."""
-        return list(self.read), [one.follower.save() for one in self.followers]
+        return list(self.read), [watch.follower.save() for watch in self.followers]
 
     def load(self, saved: Any) -> None:
         self.read = list(saved[0])
-        for one, state in zip(self.followers, saved[1], strict=True):
-            one.follower.load(state)
+        for watch, state in zip(self.followers, saved[1], strict=True):
+            watch.follower.load(state)
 
     def found(self) -> str:
         """What the followers have seen instead of what was wanted."""
         texts = [
-            f"{f'{one.condition.source}: ' if isinstance(one.condition, OfPin) else ''}{one.follower.found()}"
-            for one in self.followers
+            f"{f'{watch.condition.source}: ' if isinstance(watch.condition, OfPin) else ''}{watch.follower.found()}"
+            for watch in self.followers
         ]
         return "; ".join(dict.fromkeys(texts))
 

@@ -247,7 +247,7 @@ class Wire(Medium):
             tick += CHARACTER_BITS * bit
 
     def _takes(self, first_tick: int, end_tick: int, characters: int) -> bool:
-        """Whether a transmission comes to the processor."""
+        """True if a transmission comes to the processor."""
         return self.between is None or self.between.takes(first_tick, end_tick, characters)
 
     def _give(self, tick: int, level: int) -> None:

@@ -134,7 +134,7 @@ class World:
 
     @property
     def finished(self) -> bool:
-        """Whether the scenario's duration has passed, or a firmware fault has stopped the run."""
+        """True if the scenario's duration has passed, or a firmware fault has stopped the run."""
         return self.stopped or self.index >= self.periods
 
     @property
