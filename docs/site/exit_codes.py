@@ -16,22 +16,20 @@ from mirotwin.shell.verdicts import (
 )
 
 WHEN: dict[Verdict, str] = {
-    "error": "a file, a key or an option cannot be used: one line names file, place, what is wrong and the remedy."
-    " Also a disk that is full",
-    "differs": "a replay, or one of two recordings, differs; a case is not reproduced",
+    "error": "a file, a key or an option is unusable, or the disk is full: one line names place and remedy",
+    "differs": "a replay or a recording differs; a case is not reproduced",
     "fault": "the firmware did [what it must not](../robot_fw/README.md#faults-what-firmware-must-not-do)",
-    "failed": "a check, a step, a rule or a test failed; the fuzzer found something; a campaign got worse",
-    "not judged": "a check that is named had no occasion to judge",
-    "limit": "the limit of virtual time or of cycles was reached before what was waited for",
-    "passed": "what was asked for was done, and nothing expected failed",
-    "not observable": "nothing of what was asked for can be seen: `test`, `conform` and `replay` at a port,"
-    " a case of a check that needs symbols on an image without them; pytest ends so where it finds no test",
+    "failed": "a check, step, rule or test failed; the fuzzer found something; a campaign got worse",
+    "not judged": "a named check had no occasion to judge",
+    "limit": "time or cycles ran out first",
+    "passed": "all was done, and nothing failed",
+    "not observable": "nothing requested can be seen, as at a port; pytest found no test",
 }
 OTHERS = {
-    INTERNAL_ERROR: "a mistake of this program: one line to report; `MIROTWIN_TRACEBACK=1` adds the traceback",
+    INTERNAL_ERROR: "a bug in Mirotwin: report the line; `MIROTWIN_TRACEBACK=1` adds the traceback",
     SIGNALLED + SIGHUP: "SIGHUP",
     INTERRUPTED: "Ctrl-C",
-    SIGNALLED + SIGPIPE: "the reader of the output has closed it, as `head` does",
+    SIGNALLED + SIGPIPE: "the reader closed the output, as `head` does",
     SIGNALLED + SIGTERM: "SIGTERM",
 }
 """Exit codes without a verdict, and when they are given."""
