@@ -145,20 +145,29 @@ def threaded(c):
     for switch in SWITCH_OF_A_LOOP.finditer(c):
         indent, value, arms, again = switch["indent"], switch["value"], switch["arms"], switch["again"]
         numbers = {int(number, 0) for number in re.findall(rf"^{indent}  case (\w+):", arms, re.M)}
+        # The last `while` before the switch, one step to the left: that is the loop around it.
         before, loop, head = c[: switch.start()].rpartition(f"{indent[2:]}while (1) {{\n")
+        # A brace in the first column ends a function: then the `while` is of another one.
         if len(numbers) < INTERPRETER_ARMS or max(numbers) > 0xFF or not loop or "\n}\n" in head:
             continue
         targets = (f"&&arm_{number}" if number in numbers else f"&&{again}" for number in range(0x100))
         table = f"static void *const arm_of[0x100] = {{{', '.join(targets)}}};\n"
+        # Cython quotes the source in comments: they would stand in the file once for each arm.
         head = re.sub(r"/\*.*?\*/", "", head, flags=re.S)
         head = re.sub(r"if \((__pyx_t_\w+)\) {", r"if (unlikely(\1)) {", head)
+        # Without the test a value of no arm would be an index outside of the table, where `switch` takes
+        # `default`.
         step = f"{head}if ({value} < 0 || {value} > 0xFF) goto {again};\ngoto *arm_of[{value}];\n"
         arms = re.sub(
             rf"^{indent}  case (\w+):", lambda case: f"{case[0]} arm_{int(case[1], 0)}:;", arms, flags=re.M
         )
+        # Doubled, because `re.sub` takes a backslash in its replacement for an escape, and C has some in its
+        # texts.
         arms = re.sub(rf"^{indent}  break;\n", step.replace("\\", r"\\"), arms, flags=re.M)
         first, last = switch.span("arms")
+        # `used`: nothing refers to the mark, and the compiler would leave it out.
         sign = f'static const char dispatch[] __attribute__((used)) = "{hot_modules().DISPATCH_MARK.decode()}";\n'
+        # The table stands in the function: addresses of its labels are constants only there.
         return before + table + loop + head + c[switch.start() : first] + arms + c[last:] + sign
     return c
 
@@ -181,6 +190,7 @@ def constants(c):
     numbers = {}
     for setting in SETTING.finditer(c):
         name, value = setting.groups()
+        # Set twice it is a variable: the first number would be taken for all time.
         if name in declared and times[name] == 1 and (literal := number(c, setting.start(), value)):
             numbers[name] = literal
     c = SETTING.sub(lambda setting: "" if setting[1] in numbers else setting[0], c)
@@ -194,6 +204,7 @@ def number(c, end, value):
     """The number that `value` is; that of a temporary was set last before `end`. "" if it is none."""
     if value.startswith("__pyx_t_"):
         setting = f"  {value} = "
+        # Backwards: Cython uses a temporary for many settings, and only the last one is this one's.
         place = c.rfind(setting, 0, end)
         value = c[place + len(setting) : c.find(";", place)] if place >= 0 else ""
     return value if re.fullmatch(NUMBER, value) else ""
@@ -220,6 +231,7 @@ class BuildHot(build_ext):
         gc.set_threshold(1_000_000)  # a fifth of the time of translating is looking for garbage
         folder = Path(self.build_temp).absolute() / "stamped"
         stamped = self._stamp(folder)
+        # After `_stamp`, which copies all: a module that is built includes the .pxd of others.
         self.extensions = [extension for extension in self.extensions if extension.name.startswith(self.only)]
         shared = hot_modules().SHARED
         translated = cythonize(
@@ -277,6 +289,7 @@ class BuildHot(build_ext):
                 relative = Path(package) / path.relative_to(folder)
                 name = ".".join(relative.with_suffix("").parts)
                 is_hot = path.suffix != ".pxd" and name in hashes
+                # Cython needs each package's `__init__.py` to know that the folder is one.
                 if path.suffix == ".py" and not is_hot and path.name != "__init__.py":
                     continue
                 copy = target / relative

@@ -35,6 +35,7 @@ class Bodies:
     def start_again(self, touching: list[Pair]) -> None:
         """The robots are somewhere else than they were: `touching` are those that touch there."""
         self.touching = touching
+        # The bounds held for other positions: every pair is looked at in the next piece.
         self.next_ticks = [0] * len(self.pairs)  # of each pair: it cannot touch before
         self.next_tick = 0  # the first of them
 
@@ -50,6 +51,7 @@ class Bodies:
 
     def begin(self, tick: int, until_tick: int) -> None:
         """A piece begins at `tick`: robots that may touch in it note where they are, from when they may."""
+        # Those of the piece before: robots that are far apart again must not note on.
         if self.looks:
             self.looks = []
             for robot in self.robots:
@@ -64,6 +66,7 @@ class Bodies:
                 if look_tick <= until_tick:
                     self.looks.append((index, look_tick))
                     for robot in (first, other):
+                        # `min`: a robot of several pairs notes from the first of their ticks on.
                         robot.note_from(min(look_tick, robot.grid_tick))
         self.next_tick = min(self.next_ticks)
 
@@ -77,14 +80,17 @@ class Bodies:
                 known = (first, other) in self.touching
                 if touch(pose, other_pose) != known:
                     if known:
+                        # A new list, here and below: a `Mark` holds the old one, and a wait goes back to it.
                         self.touching = [pair for pair in self.touching if pair != (first, other)]
                     else:
                         self.touching = [*self.touching, (first, other)]
                         touches.append((tick, first, other))
+                # Also while they touch: that the touch ends must be seen, or the next one is not reported.
                 tick = next_look(tick, pose, other_pose, closing_m_s)
             self.next_ticks[index] = tick
         if self.looks:
             self.next_tick = min(self.next_ticks)
+        # They were found pair by pair; the log is in the order of time.
         touches.sort(key=itemgetter(0))
         return touches
 
@@ -97,4 +103,5 @@ def _most_m_s(robot: Robot) -> float:
 
 def _noted(robot: Robot, tick: int) -> Pose:
     """Where the robot was at a tick of the grid; its last note is of the one before `grid_tick`."""
+    # From the end: at which tick the notes begin is not kept.
     return robot.noted[len(robot.noted) - (robot.grid_tick - tick) // GRID_TICKS]

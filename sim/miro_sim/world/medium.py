@@ -78,9 +78,11 @@ class Medium:
         self.sent = []
 
     def send_due(self, rendezvous_tick: int) -> None:
-        """Sends what may come up before the tick up to which the line is settled next, and nothing else: what may
-        still be announced at the rendezvous is not in the state there, whenever it was announced.
+        """Sends what comes up before the line is settled at the next rendezvous, and no more.
+
+        What can still be announced there must not be in its state, whenever it was announced.
         """
+        # A bit is heard `latency` after it leaves: later ones change nothing that is about to be settled.
         for sent in self.outbox.due(rendezvous_tick + SETTLE_TICKS - self.latency):
             self.send(sent)
             self.sent.append(sent)
@@ -118,6 +120,7 @@ class Medium:
 
     def earliest_tick(self, now: int) -> int:
         """The earliest first start bit of characters that are injected at tick `now`."""
+        # `send_due` has sent what comes before this. `max`: a long latency would give a tick below 0.
         return max(0, now + SETTLE_TICKS + self.outbox.lead_ticks - self.latency)
 
     def inject(self, data: bytes, at_tick: int | None, now: int, bad_stop: tuple[int, ...]) -> int:
@@ -129,6 +132,7 @@ class Medium:
             limits = f"the earliest is {earliest}, the latest {LATEST_TICK} (a day)"
             raise ValueError(f"net{self.index}: tick {at_tick} is out of range; {limits}")
         free_tick = self.free_tick()
+        # Behind what waits too: two calls at one tick would otherwise collide.
         tick = max(earliest, self.outbox.end_tick(free_tick)) if at_tick is None else at_tick
         try:
             check_bad_stop(bad_stop, len(data))
@@ -141,6 +145,7 @@ class Medium:
         """Raises ValueError for an action that cannot be done here."""
         if isinstance(action, RadioState):
             raise ValueError(f"net{self.index}: is a wire, which has no radio")
+        # Before the slot is looked at: a seed is of the whole line, and slot 0 may have no robot.
         if isinstance(action, Reseed):
             if not 0 <= action.seed <= MAX_SEED:
                 raise ValueError(f"net{self.index}: seed {action.seed}; give 0 to {MAX_SEED}")
@@ -181,11 +186,13 @@ class Medium:
     def records(self) -> list[Any]:
         """What observers take away and no snapshot holds, to go back to with `put_back`."""
         devices = [device.records() for device in self.devices]
+        # Copies: the piece that follows appends to both.
         return [list(self.sent), list(self.actions.done), self.log.end, devices]
 
     def put_back(self, records: list[Any]) -> None:
         """Takes back what `records` gave; nothing but more of the same may have happened since."""
         sent, done, log_end, devices = records
+        # A copy again: a wait goes back to one mark more than once.
         self.sent = list(sent)
         self.actions.done = list(done)
         self.log.cut(log_end)
@@ -197,6 +204,7 @@ class Medium:
 
         A part that is far behind would need hours to catch up.
         """
+        # RADIO_DOWN waits 120 ticks before its action: at tick 0 it may be due at -120.
         if self.actions.next_tick < tick - SETTLE_TICKS:
             raise ValueError(f"an action waits for tick {self.actions.next_tick}, at tick {tick}")
         for reseed in self.actions.reseeds:
@@ -206,10 +214,12 @@ class Medium:
         free_tick = self.free_tick()
         if free_tick > tick + LONGEST_TRANSMISSION_TICKS:
             raise ValueError(f"the transmitter is busy until tick {free_tick}, at tick {tick}")
+        # The outbox does not know what is on the air: it would send into another character.
         if self.outbox.waiting and self.outbox.waiting[0].sent.tick < free_tick:
             raise ValueError(f"characters wait, but the transmitter is busy until tick {free_tick}")
         for device in self.devices:
             cpu = device.board.cpu
+            # Further ahead than one instruction the CPU has read levels that were not settled.
             if not earliest_tick <= cpu.cycles * CYCLE_TICKS <= tick + SETTLE_TICKS:
                 raise ValueError(f"a CPU is at cycle {cpu.cycles}, at tick {tick}")
 
@@ -225,6 +235,7 @@ class Medium:
 
 def sent_to(index: int, script: Sequence[ScriptItem] | None) -> list[Transmission] | None:
     """The transmissions of a script on line `index`."""
+    # Not []: an empty script silences the station, none lets it send.
     if script is None:
         return None
     return [item for item in script if isinstance(item, Transmission) and item.network == index]

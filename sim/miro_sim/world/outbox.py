@@ -82,6 +82,7 @@ class Outbox:
 
         `free_tick`: when the last transmission on the air is over.
         """
+        # No queue: the command of an earlier camera frame would reach the robot late, as if it were new.
         if sent.tick < free_tick or [entry for entry in self.waiting if self._overlap(entry.sent, sent)]:
             self.dropped += 1
             return False
@@ -97,17 +98,21 @@ class Outbox:
         if sent.tick < free_tick:
             raise ValueError(f"tick {sent.tick}: the transmitter is busy until tick {free_tick}")
         count = len(self.waiting)
+        # `count - 1`, not -1: compiled code does not index from the end (setup.py, `wraparound`).
+        # `<=`: the next start bit may begin on the tick on which the last stop bit is over.
         if not count or self._end(self.waiting[count - 1].sent) <= sent.tick:  # a long script comes in order
             self.waiting.append(Waiting(sent, INJECTED))
             return
         for item in self.waiting:
             old = item.sent
+            # Who begins first has the line, or it would matter whether the frame was posted before this.
             if self._overlap(old, sent) and (item.origin == INJECTED or old.tick < sent.tick):
                 busy = f"is busy from tick {old.tick} to {self._end(old)}"
                 size = len(sent.data)
                 raise ValueError(
                     f"tick {sent.tick}: the transmitter {busy}; {size} characters end at tick {self._end(sent)}"
                 )
+        # Only frames of the station are left to overlap: they find the transmitter busy, as in `post`.
         remaining = [item for item in self.waiting if not self._overlap(item.sent, sent)]
         self.dropped += len(self.waiting) - len(remaining)
         self.waiting = remaining
@@ -122,6 +127,7 @@ class Outbox:
     def due(self, until_tick: int) -> list[Transmission]:
         """Takes out what comes up on the air before `until_tick`, in order; what comes then can be announced still."""
         count = 0
+        # The carrier comes up `lead_ticks` before the start bit, and other networks hear it from then on.
         while count < len(self.waiting) and self.waiting[count].sent.tick < until_tick + self.lead_ticks:
             count += 1
         taken = [entry.sent for entry in self.waiting[:count]]
@@ -133,11 +139,13 @@ class Outbox:
         free_tick = 0
         for place, item in enumerate(self.waiting):
             sent = item.sent
+            # `end_tick` and `inject` look at the last one only, which is right only without overlaps.
             if sent.tick < free_tick or not sent.data:
                 raise ValueError(
                     f"{len(sent.data)} characters wait for tick {sent.tick}, behind tick {free_tick}"
                 )
             free_tick = self._end(sent)
+            # A row has no network; the log and the recording name it.
             self.waiting[place] = Waiting(msgspec.structs.replace(sent, network=self.network), item.origin)
 
     def _end(self, sent: Transmission) -> int:

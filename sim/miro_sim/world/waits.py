@@ -103,8 +103,10 @@ class Waits:
         with Watch(world, conditions, self.ended_tick, self.ended_pins) as watch:
             self.backlog += watch.true_now()
             self.backlog.sort(key=itemgetter(0))
+            # Followers go forward in time: what is left of earlier waits before what `_gather` reads now.
             self.backlog += watch.matches(self.backlog)
             self._gather(watch)
+            # Before anything runs: an event that is waiting already ends the wait where the world stands.
             event = self._consume(watch, world.tick, events)
             piece = FIRST_PIECE_TICKS
             while event is None:
@@ -113,14 +115,17 @@ class Waits:
                     self._forget_followed()
                     raise WaitExpired(conditions, begun_tick, world.tick, why, events, watch.found())
                 self._run_piece(watch, min(deadline, world.tick + piece))
+                # Here, because a world saved with its period open at the period's end is refused by `load`.
                 if world.in_period and (world.tick == world.period_end or world.stopped):
                     world.end_period()
                 event = self._consume(watch, world.tick, events)
                 piece *= 2
+            # The CPU ran past the tick: its edges there would be lost when the watch on the pins closes.
             self.backlog += watch.edges(beyond=True)
             self._forget_followed()
         if event.tick != self.ended_tick:
             self.ended_tick, self.ended_pins = event.tick, []
+        # A second wait for this pin at this tick must not end with the same edge.
         self.ended_pins.append(event.pin)
         return event
 
@@ -131,6 +136,7 @@ class Waits:
     def _run_piece(self, watch: Watch, until_tick: int) -> None:
         """Runs to `until_tick`, the end of the control period, or the first event that is wanted."""
         world = self.world
+        # Before the mark: going back would undo the camera's exposure, and `run_piece` does not repeat it.
         world.begin_period()
         until_tick = world.rendezvous(until_tick)
         read = [cursor.next for cursor in self.cursors.values()]
@@ -138,6 +144,7 @@ class Waits:
         before = len(self.backlog), read, states, watch.save(), world.mark()
         inspectors = self._inspectors()
         for inspector in inspectors:
+            # The piece may run several times, and these must see each instruction once: in its last run.
             inspector.pause()
         try:
             end_tick, reached = self._end_of_piece(watch, before, until_tick)
@@ -146,6 +153,7 @@ class Waits:
                 inspector.resume()
         if inspectors:
             self._again_to(watch, before, end_tick)
+        # Only now: `_again_to` has cut the backlog.
         self.backlog += reached
 
     def _end_of_piece(self, watch: Watch, before: Before, until_tick: int) -> tuple[int, list[Entry]]:
@@ -157,10 +165,12 @@ class Waits:
         if not wanted:
             return until_tick, []
         first, event = min(wanted, key=itemgetter(0))
+        # The last instruction ran past the piece: the event is found when the world has come to its tick.
         if first[0] >= until_tick:
             return until_tick, []
         tick = max(first[0], begun_tick)
         self._again_to(watch, before, tick)
+        # An event shows in a run to its own tick only if its machine cycle began before that.
         if any(key == first for key, _ in self.backlog):
             return tick, []
         if event.what == "reached":  # the CPU stands before it and has not looked at it again
@@ -183,20 +193,24 @@ class Waits:
         for state, saved in zip(self.states, states, strict=True):
             state.load(saved)
         watch.load(followers)
+        # After the load: the pins' first levels are those that they have there.
         watch.pick_up()
         self.world.run_piece(tick)
         self._gather(watch)
 
     def _consume(self, watch: Watch, until_tick: int, events: list[Event]) -> Event | None:
         """Takes events out of the backlog, in order, up to `until_tick` or the first that is wanted."""
+        # By key alone and stable: events cannot be compared, and a frame stays behind its last character.
         self.backlog.sort(key=lambda entry: entry[0])
         wanted = None
         count = 0
         for key, event in self.backlog:
+            # Seen already, because a CPU ran ahead; left for a wait that comes to it.
             if key[0] > until_tick:
                 break
             count += 1
             if event.what == "reached":
+                # The CPU still stands before it: going on notes it a second time.
                 self.reached[event.network, event.slot] = event.value
             if watch.wants(event):
                 wanted = event
@@ -220,6 +234,7 @@ class Waits:
             for serial, event in cursor.read():
                 if event.what == "reached" and self.reached.get(source) == event.value:
                     continue  # a wait has ended before this instruction already
+                # Tick, then network and slot: without them two robots' events of one tick come in any order.
                 key = (event.tick, *source, serial)
                 new.append((key, event))
                 if event.what != "received" or source not in self.decoders:

@@ -120,6 +120,7 @@ class World:
         self._opened: tuple[bytes, bytes] | None = None  # a saved world that is whole, and its state
         for item in script or ():
             if not isinstance(item, Transmission):
+                # From tick 0 on, not 120: nothing is settled before the first instruction.
                 self._announce(item, 0)
 
     @property
@@ -178,12 +179,14 @@ class World:
 
         Raises ValueError for what is no whole number.
         """
+        # Clipped here: the compiled twin would raise OverflowError beyond 64 bits, the uncompiled one not.
         self._run_to(max(0, min(_whole(tick), NEVER_TICK)))
 
     def _run_to(self, tick: int) -> None:
         while self.tick < tick and not self.stopped:
             self.begin_period()
             self.run_piece(self.rendezvous(tick))
+            # A fault ends it early: its records and its link in the digest would be missing.
             if self.stopped or self.tick == (self.index + 1) * self.period_ticks:
                 self.end_period()
 
@@ -313,6 +316,7 @@ class World:
         next_tick = min(tick, (self.index + 1) * self.period_ticks)
         for line in self.lines:
             if line.actions.waiting:
+                # Not `next_tick`: RADIO_DOWN of an action at tick 0 waits at -120, and time would go back.
                 action_tick = line.actions.next_after(self.tick)
                 next_tick = min(next_tick, action_tick)
         return next_tick
@@ -321,16 +325,20 @@ class World:
         """Everything on to `tick`, which is no later than the end of the period."""
         for line in self.lines:
             if line.actions.waiting:
+                # Before `settle`: a radio that goes down must not settle its next 120 ticks as if up.
                 line.actions.do_due(line, self.tick)
         for line in self.lines:
+            # All send before one settles: on one frequency a network hears its neighbours' carriers.
             line.send_due(tick)
         for line in self.lines:
             line.settle(tick)
         bodies = self.bodies
         if bodies is not None and bodies.pairs:
+            # Before the robots run: they note where they are only from the tick that this gives them.
             bodies.begin(self.tick, tick)
         self.tick = tick
         for line in self.lines:
+            # Not `self.stopped or ..`: the lines after the one that stops would stay behind its tick.
             self.stopped = line.run(tick) or self.stopped
         for line in self.lines:
             line.hear(tick)
@@ -352,6 +360,8 @@ class World:
         index = self.index
         self.in_period = False
         self.index += 1
+        # After the index has moved on: the digest is that of a world between two periods, as `load` finds it.
+        # The state holds the chain so far, so one digest stands for all periods before it.
         self.chain = hashlib.sha256(self.state.hashed()).digest()
         actions: list[Action] = []
         values: list[PartValues] = []
@@ -417,12 +427,14 @@ class World:
         Raises ValueError, and stays as it is, for anything else: a world of another scenario, seed, firmware or version
         of this program, one that is damaged, and one whose values cannot be.
         """
+        # By identity: who loads one saved world again and again pays for its checksum once.
         if self._opened is None or self._opened[0] is not saved:
             self._opened = (saved, opened(saved, self.identity()))
         self.go_on_from(self._opened[1])
 
     def go_on_from(self, flat: bytes) -> None:
         """Goes on from what `state.save` gave of this world; it has no seal to check."""
+        # First, because it may refuse: waits and touches are forgotten only when the world has moved.
         self.state.load(flat)
         if self.bodies is not None:
             self.bodies.start_at(self.tick)
@@ -434,6 +446,7 @@ class World:
     def after_load(self) -> None:
         """Raises ValueError unless all parties stand where the world does."""
         begun = self.index * self.period_ticks
+        # A fault may have ended the period anywhere in it: then the world stands before `begun`.
         first = begun - self.period_ticks if self.stopped else begun
         last = begun + self.period_ticks - 1 if self.in_period or self.stopped else begun
         if not first <= self.tick <= last:
@@ -442,6 +455,7 @@ class World:
             raise ValueError(f"the digest has {len(self.chain)} bytes after {self.index} periods")
         for line in self.lines:
             line.check_times(begun - self.period_ticks, self.tick)
+            # A stream's seed is no state: without this the noise would go on with the seed of before the load.
             line.actions.draw_again(line, self.seed)
 
     def identity(self) -> Identity:
@@ -449,6 +463,7 @@ class World:
         if self._own is None:
             from miro_sim.scenario.keys import without_expectations
 
+            # `[expect]` changes no bit: a world saved before a check was added can still be loaded.
             bare = without_expectations(self.scenario)
             scenario = hashlib.sha256(msgspec.json.encode(bare, order="sorted")).hexdigest()
             firmware = self.image.sha256 or hashlib.sha256(self.image.code).hexdigest()  # "": not from a file
@@ -481,6 +496,7 @@ def _total(values: Sequence[int | None]) -> int | None:
 
 def _whole(ticks: int) -> int:
     try:
+        # `operator.index(True)` is 1, and `run_to(True)` would pass unnoticed.
         if isinstance(ticks, bool):
             raise TypeError
         return operator.index(ticks)
