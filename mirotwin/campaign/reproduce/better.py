@@ -62,10 +62,10 @@ def compare(table: Table, figure: int, rival: str, camera: str, error: str) -> C
         {row.seed: row for row in rows_of(table, figure, controller, camera)} for controller in (PAPER, rival)
     )
     pairs = [(ours[seed], theirs[seed]) for seed in ours if seed in theirs]
-    only_ours = sum(one.settled and not other.settled for one, other in pairs)
-    only_theirs = sum(other.settled and not one.settled for one, other in pairs)
+    only_ours = sum(our.settled and not other.settled for our, other in pairs)
+    only_theirs = sum(other.settled and not our.settled for our, other in pairs)
     errors = _errors(pairs, ERRORS[error])
-    nearer = rank_interval(np.array([other - one for one, other in errors]), 1.0 - LEVEL)
+    nearer = rank_interval(np.array([other - our for our, other in errors]), 1.0 - LEVEL)
     by_settled = sign_test(only_ours, only_theirs) <= LEVEL
     if by_settled:
         verdict = OURS if only_ours > only_theirs else THEIRS
@@ -78,9 +78,9 @@ def compare(table: Table, figure: int, rival: str, camera: str, error: str) -> C
         camera=camera,
         error=error,
         runs=len(pairs),
-        settled=(sum(one.settled for one, _ in pairs), sum(other.settled for _, other in pairs)),
+        settled=(sum(our.settled for our, _ in pairs), sum(other.settled for _, other in pairs)),
         pairs=len(errors),
-        ours_cm=median(one for one, _ in errors) if errors else None,
+        ours_cm=median(our for our, _ in errors) if errors else None,
         theirs_cm=median(other for _, other in errors) if errors else None,
         nearer=nearer,
         by_settled=by_settled,

@@ -132,7 +132,10 @@ def _robust(table: Table, disturbances: Sequence[str]) -> Judged:
 
 def _asymptotic(table: Table) -> Judged:
     pairs = [
-        [middle(settled(rows_of(table, figure, one)), "seen_position_cm") for one in (PAPER, IMPROVED)]
+        [
+            middle(settled(rows_of(table, figure, controller)), "seen_position_cm")
+            for controller in (PAPER, IMPROVED)
+        ]
         for figure in (6, 7, 8)
     ]
     small = [None if seen is None or better is None else seen <= 2.0 * better for seen, better in pairs]
@@ -230,7 +233,7 @@ def superior(verdicts: Sequence[str]) -> str:
 
 def _compared(table: Table, figure: int, controller: str, name: str) -> tuple[str, bool | None]:
     """A figure of the paper's law beside that of another, and whether the former is smaller: over runs that settle."""
-    groups = [rows_of(table, figure, one) for one in (PAPER, controller)]
+    groups = [rows_of(table, figure, law) for law in (PAPER, controller)]
     ours, other = (middle(settled(rows), name) for rows in groups)
     if ours is None or other is None:
         counts = " beside ".join(f"{len(settled(rows))} of {len(rows)}" for rows in groups)

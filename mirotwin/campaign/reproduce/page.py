@@ -46,10 +46,10 @@ in *truth*, or as the *camera* sees it (measurement against reference), which is
 """
 
 
-def page(found: StoredTables, folder: str, tables: str) -> str:
+def page(stored: StoredTables, folder: str, tables: str) -> str:
     """The whole text. `folder`: where the pictures are, and the file of all tables, as links say it."""
-    parts = _better(found), _claims(found), _figures(found, folder), _cameras(found)
-    head = HEAD.format(opening=_opening(found), tables=f"{folder}/{tables}", **found.about)
+    parts = _better(stored), _claims(stored), _figures(stored, folder), _cameras(stored)
+    head = HEAD.format(opening=_opening(stored), tables=f"{folder}/{tables}", **stored.about)
     return "\n".join([head, *(line for part in parts for line in part)])
 
 
@@ -69,11 +69,11 @@ settle and that their median error is within 2.40 cm.
 """
 
 
-def _claims(found: StoredTables) -> Iterator[str]:
+def _claims(stored: StoredTables) -> Iterator[str]:
     yield CLAIMS
     rows = [
         (figure, claim, deciding, f"**{verdict}**")
-        for figure, claim, _, _, deciding, verdict in found.rows("claims")
+        for figure, claim, _, _, deciding, verdict in stored.rows("claims")
     ]
     yield from _table(("figure", "claim", "what decides", "verdict"), rows)
 
@@ -91,26 +91,26 @@ OPPOSITE = "Under a biased camera the true error and the error that the camera s
 DEPENDS = "Which law is better depends on the camera, and on the error that is meant."
 
 
-def _compared(found: StoredTables, rival: str, camera: str, error: str) -> list[Row]:
+def _compared(stored: StoredTables, rival: str, camera: str, error: str) -> list[Row]:
     """The comparisons from all starts."""
     key = [rival, camera_name(camera), error]
-    return [row for row in found.rows("comparisons") if row[:3] == key]
+    return [row for row in stored.rows("comparisons") if row[:3] == key]
 
 
 def _wins(rows: Iterable[Row], verdict: str) -> int:
     return sum(row[-1] == verdict for row in rows)
 
 
-def _opening(found: StoredTables) -> str:
+def _opening(stored: StoredTables) -> str:
     """What the page has to say first: which law is better depends on the camera and on the error."""
     lines = []
     for camera in ALL_CAMERAS:
         counts = []
         for error in ERRORS:
-            rows = _compared(found, RIVALS[0], camera, error)
+            rows = _compared(stored, RIVALS[0], camera, error)
             counts.append(f"{_wins(rows, OURS)} / {_wins(rows, THEIRS)} {SIDES[error]}")
         lines.append(f"with `{camera_name(camera)}` from {' and '.join(counts)}")
-    in_truth, as_seen = (_compared(found, RIVALS[0], "", error) for error in ERRORS)
+    in_truth, as_seen = (_compared(stored, RIVALS[0], "", error) for error in ERRORS)
     opposite = _wins(in_truth, OURS) > _wins(in_truth, THEIRS) and _wins(as_seen, OURS) < _wins(
         as_seen, THEIRS
     )
@@ -121,12 +121,12 @@ def _opening(found: StoredTables) -> str:
     return fill(text, 118, break_long_words=False, break_on_hyphens=False) + "\n"
 
 
-def _better(found: StoredTables) -> Iterator[str]:
+def _better(stored: StoredTables) -> Iterator[str]:
     yield BETTER.format(count=COMPARISONS, level=100 * SHARE)
     lines = [
         (
             f"{rival.removeprefix('epsilon, ')}; {camera_name(camera)}; {error}",
-            *map(_cell, _compared(found, rival, camera, error)),
+            *map(_cell, _compared(stored, rival, camera, error)),
         )
         for rival in RIVALS
         for camera in ALL_CAMERAS
@@ -147,10 +147,10 @@ FIGURE_COLUMNS = {"truth": 2, "not settled": 8}
 """Columns of the table `figures`."""
 
 
-def _figures(found: StoredTables, folder: str) -> Iterator[str]:
+def _figures(stored: StoredTables, folder: str) -> Iterator[str]:
     yield "## The figures\n"
     yield "Median error in truth in cm of all runs, and in brackets how many of them do not settle:\n"
-    rows = found.rows("figures")
+    rows = stored.rows("figures")
     cells = {
         (
             controller,
@@ -165,7 +165,7 @@ def _figures(found: StoredTables, folder: str) -> Iterator[str]:
         for controller in dict.fromkeys(row[1] for row in rows)
     ]
     yield from _table(("controller", *figures), lines)
-    for figure, controller, lost, frames, seen, everywhere in found.rows("lost"):
+    for figure, controller, lost, frames, seen, everywhere in stored.rows("lost"):
         yield (
             f"*{controller}* in {figure} is a lost camera: in the median run the robot is not found in {lost} of"
             f" {frames} frames.\nWith white noise in place of pictures its error is {everywhere} cm, not {seen} cm.\n"
@@ -175,12 +175,12 @@ def _figures(found: StoredTables, folder: str) -> Iterator[str]:
         yield f"![Fig. {start.figure} again]({folder}/{start.name}.svg)\n"
 
 
-def _cameras(found: StoredTables) -> Iterator[str]:
+def _cameras(stored: StoredTables) -> Iterator[str]:
     yield "## What the camera decides\n"
     yield f"Median error in truth in cm; that with `{camera_name('')}` is above.\n"
     rows = [
         (camera, controller, *(cell.partition(" / ")[0] for cell in cells))
-        for camera, controller, *cells in found.rows("cameras")
+        for camera, controller, *cells in stored.rows("cameras")
         if camera in CAMERAS
     ]
     yield from _table(("camera", "controller", *FIGURES), rows)

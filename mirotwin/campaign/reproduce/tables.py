@@ -83,7 +83,7 @@ def tables_of(table: Table, seeds: str) -> StoredTables:
 
 def _claims(table: Table) -> Iterator[Row]:
     yield [field.name for field in fields(ClaimResult)]
-    yield from (list(astuple(found)) for found in findings(table))
+    yield from (list(astuple(finding)) for finding in findings(table))
 
 
 def _comparisons(table: Table) -> Iterator[Row]:
