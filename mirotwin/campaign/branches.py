@@ -71,7 +71,9 @@ def branch(spec: RunSpec, tick: int, seed: int) -> RunSpec:
     if tick == FROM_START:
         return replace(spec, seed=seed)
     lines = range(len(getattr(spec.scenario, "networks", ())) or 1)
+    # `tick + SETTLE_TICKS` is what `earliest_action_tick` is in a copy: both ways give the same bits.
     reseeds = [Reseed(tick + SETTLE_TICKS, line, seed) for line in lines]
+    # A stable sort: behind the script's own actions of that tick, as `do` puts it in a copy.
     script = sorted([*(spec.script or ()), *reseeds], key=lambda item: item.tick)
     return replace(spec, script=script, computed=spec.computed or spec.script is None)
 
@@ -85,12 +87,15 @@ def branched(spec: RunSpec, name: str, tick: int, seeds: Sequence[int], jobs: in
 
     def look(period: Period | None) -> None:
         nonlocal own_seed
+        # A copy that knows its verdict ends here: the rest of the run would change nothing.
         if own_seed is not None and has_failed(run, name):
             os._exit(FAILED)
+        # `own_seed`: a copy comes here in every later period, and must not copy itself again.
         if own_seed is not None or run.world.tick < tick:
             return
         own_seed = _copied(seeds, jobs, codes)
         if own_seed is None:
+            # Out of the run from within an observer: this process itself has nothing more to compute.
             raise _AllBranched
         for line in run.world.lines:
             run.world.do(Reseed(run.world.earliest_action_tick, line.index, own_seed))
@@ -100,6 +105,7 @@ def branched(spec: RunSpec, name: str, tick: int, seeds: Sequence[int], jobs: in
             own_seed = _copied(seeds, jobs, codes)
         if tick != FROM_START or own_seed is not None:
             run = Run(spec if own_seed is None else replace(spec, seed=own_seed))
+            # Observers are called at the end of a period: a branch at the run's first tick would be missed.
             look(None)
             run.world.observers.append(look)
             codes = [FAILED if has_failed(run.play(), name) else PASSED] * len(seeds)  # over before that tick
@@ -107,6 +113,7 @@ def branched(spec: RunSpec, name: str, tick: int, seeds: Sequence[int], jobs: in
         pass
     except BaseException:
         if own_seed is not None:
+            # A copy that let the exception out would go on as a second campaign, on the same files.
             os._exit(BROKEN)
         raise
     if own_seed is not None:
@@ -122,12 +129,14 @@ def _copied(seeds: Sequence[int], jobs: int, codes: list[int]) -> int | None:
     running: list[int] = []
     for place in range(len(seeds) + jobs):
         if place >= jobs and running:
+            # The oldest first, even if a later one has ended: codes are in the order of the seeds.
             codes.append(os.waitstatus_to_exitcode(os.waitpid(running.pop(0), 0)[1]))
             if codes[-1] not in (PASSED, FAILED):
                 raise RuntimeError(f"a branch ended with exit code {codes[-1]}")
         if place < len(seeds):
             process = os.fork()
             if not process:
+                # With what it shares still frozen: a copy never thaws it.
                 return seeds[place]
             running.append(process)
     gc.unfreeze()
@@ -152,6 +161,7 @@ def search(
         return points[index]
 
     grid = [end * place // coarse for place in range(coarse + 1)]
+    # The last one: the share may fall again, and the question is from when on it stays high.
     low = max((index for index in grid if look(index).share < 0.5), default=-1)
     if low >= 0:
         high = min(index for index in [*grid, end] if index > low)

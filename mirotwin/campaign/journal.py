@@ -1,4 +1,4 @@
-"""Outcomes while a campaign is under way: a file to which each one is added as soon as it is there.
+"""The journal of a campaign: a file to which each outcome is added as soon as it is there.
 
     {"mirotwin_campaign":1,"hash":"..","versions":{..},"runs":1000}
     {"run":0,"verdict":"passed",..}              one line an outcome, in the order in which they came
@@ -50,12 +50,14 @@ class Journal:
         # unbuffered and appending: each line is one write, so a process that is killed leaves at most one cut line
         self._stream: BinaryIO = path.open("a+b", buffering=0)
         try:
+            # Before anything is read or cut: another campaign may be in the middle of a line.
             if locked_elsewhere(self._stream.fileno()):
                 remedy = "wait, or choose another file with --out"
                 raise BadInput(path, "", "another process is writing to it", remedy)
             if discard:  # once it is locked: not from under another process
                 self._stream.truncate(0)
             self._take_up()
+        # Ctrl-C too: the lock lasts as long as the stream is open.
         except BaseException:
             self._stream.close()
             raise
@@ -70,8 +72,10 @@ class Journal:
         """Writes the outcome of a run; a second one of the same run is left out."""
         if self.done[outcome.run]:
             return
+        # Counted only after this: a run whose line a full disk refused stays missing, and is done again.
         self._stream.write(json_bytes(outcome) + b"\n")
         self._count(outcome.run)
+        # Not each time: waiting for the disk takes longer than many a run.
         if perf_counter() - self._synced_s >= SYNC_S:
             os.fsync(self._stream.fileno())
             self._synced_s = perf_counter()
@@ -90,6 +94,7 @@ class Journal:
     def _take_up(self) -> None:
         """Reads what an earlier process has left, and cuts off a line that it could not finish."""
         head, whole = read_head(self.path)
+        # Outcomes of another plan count for runs that this one does not have: seed or settings may differ.
         difference = "" if head is None else self.head.difference(head)
         if head is None or (
             difference and next(outcomes(self.path), None) is None
@@ -107,7 +112,9 @@ class Journal:
                 raise BadInput(
                     self.path, "", f"has an outcome of run {outcome.run}", "start again with --force"
                 )
+            # Only lines that were understood: the file is cut behind the last of them.
             whole = end
+            # As in `add`: of two outcomes of one run the first one counts.
             if not self.done[outcome.run]:
                 self._count(outcome.run)
         self._stream.truncate(whole)  # else the next line would go on where the cut one ends
@@ -116,8 +123,10 @@ class Journal:
 def read_head(path: Path) -> tuple[Head | None, int]:
     """The first line and where it ends; None where not even that was written. Raises BadInput for another file."""
     with path.open("rb") as stream:
+        # Limited: a file of somebody else may be gigabytes without a line end.
         line = stream.readline(_LINE_BYTES)
     if not line.endswith(b"\n") and len(line) < _LINE_BYTES:
+        # A part of our begin is a head that was cut. Anything else is somebody's file, and would be emptied.
         if line and not b'{"mirotwin_campaign":'.startswith(line[:21]):
             raise _no_journal(path)
         return None, 0
@@ -141,6 +150,7 @@ def outcomes(path: Path) -> Iterator[tuple[RunOutcome, int]]:
                 raise BadInput(
                     path, number, "the line is longer than any outcome", "start again with --force"
                 )
+            # Its writer was killed within the line: the run counts as missing.
             if not line.endswith(b"\n"):
                 return
             end += len(line)
@@ -156,10 +166,12 @@ def in_order(outcomes: Iterable[RunOutcome]) -> Iterator[RunOutcome]:
     early: dict[int, RunOutcome] = {}
     turn = 0
     for outcome in outcomes:
+        # Earlier ones were given out already: a second outcome of a run would be a row too many.
         if outcome.run >= turn:
             early.setdefault(outcome.run, outcome)
         while turn in early:  # one outcome may be all that a row of early ones has waited for
             yield early.pop(turn)
             turn += 1
+    # Some run never came: what waited for it is given out all the same.
     for run in sorted(early):
         yield early[run]

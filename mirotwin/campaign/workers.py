@@ -35,6 +35,7 @@ class WorkerContext(SpawnContext):
         self.begun: list[Future[int]] = []
 
     def Process(self, *arguments: Any, **named: Any) -> SpawnProcess:  # type: ignore[override]
+        # The name tells `refuse_in_import` that it is in one of ours.
         process = SpawnProcess(*arguments, **{**named, "name": NAME})
         self.started.append(process)
         return process
@@ -43,9 +44,11 @@ class WorkerContext(SpawnContext):
         """Raises BadInput if the processes ended because the main script cannot be imported: no run is to blame."""
         for process in self.started:
             process.join(END_S)  # a broken pool ends the others, too
+        # All of them: the pool ends the others by a signal, so one exit code among many tells the cause.
         codes = [process.exitcode for process in self.started]
         if UNGUARDED in codes:
             raise BadInput("", "campaign.run", *GUARD)
+        # Who finished its first job has imported the script: then it is a run that ended the process.
         if FAILED in codes and not any(future.done() and future.exception() is None for future in self.begun):
             reason = "its processes import your script first, which fails in them for the reason above"
             raise BadInput("", "campaign.run", reason, GUARD[1])
@@ -56,6 +59,7 @@ def refuse_in_import() -> None:
 
     Raises BadInput in a process that somebody else started. `multiprocessing` marks such an import the same way.
     """
+    # Without this each worker would start a campaign of its own, and its workers too.
     if getattr(current_process(), "_inheriting", False):
         # an exception would be one traceback for each process; the exit code is read by `check_ended`
         if current_process().name == NAME:
@@ -65,6 +69,7 @@ def refuse_in_import() -> None:
 
 def processes(count: int, context: WorkerContext | None = None) -> ProcessPoolExecutor:
     """Processes with the engine of this one, which have begun."""
+    # Before the pool: its own error for this speaks of `freeze_support`, and comes once for each process.
     refuse_in_import()
     context = context or WorkerContext()
     pool, context.begun = start_pool(count, context)
@@ -109,6 +114,7 @@ class Processes(Workers):
         self.ahead = AHEAD * self.count
 
     def start(self) -> Executor:
+        # A new one each time: exit codes of a pool that broke before are no reason for this one.
         self._context = WorkerContext()
         return processes(self.count, self._context)
 

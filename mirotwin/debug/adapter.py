@@ -99,6 +99,7 @@ class Adapter:
         while not self.ended and (request := self.wire.next()) is not None:
             self.answer(request)
             while self.run_after is not None:
+                # After the response: a `stopped` before the answer to `continue` would be dropped.
                 run, self.run_after = self.run_after, None
                 run()
 
@@ -121,6 +122,7 @@ class Adapter:
             self._respond(request, refused=f"{command}: arguments that cannot be used: {error!r}")
         else:
             self._respond(request, body)
+            # The client sends its breakpoints at this event: there has to be a run by then.
             if command == "launch":
                 self._event("initialized")
 
@@ -128,6 +130,7 @@ class Adapter:
         message: Message = {"request_seq": request["seq"], "command": request["command"]}
         if refused:
             why = one_line(refused)
+            # Braces in a format are the protocol's own: the client would look for variables in them.
             text = why.replace("{", "(").replace("}", ")")
             body = {"error": {"id": 1, "format": text, "showUser": request["command"] not in _QUIET}}
             message["message"] = why
@@ -297,10 +300,12 @@ class Adapter:
         """All breakpoints of a kind, which replace those before."""
         self.its.breakpoints[:] = [item for item in self.its.breakpoints if item.kind != kind]
         self.asked[kind] = given, place, []
+        # A run that is under way goes on searching with the new ones.
         self.its.changed = True
         replies: list[Message] = []
         numbers: list[int | None] = []
         for item in given.get("breakpoints") or ():
+            # One for each requested, even if it fails: the client matches replies by order.
             numbers.append(None)
             conditions = item.get("condition") or "", item.get("hitCondition") or ""
             try:
@@ -379,6 +384,7 @@ class Adapter:
 
     def _move(self, command: str, given: Message) -> Message | None:
         thread = self._thread(given)
+        # All go on by `continue`; a step is of the robot that was chosen, and begins where that one stands.
         if thread != self.timeline.focus and not _MOVES[command].endswith("continue"):
             self.timeline.focus = thread
             self.timeline.go_to(self.timeline.tick)
@@ -388,6 +394,7 @@ class Adapter:
 
     def on_pause(self, given: Message) -> None:
         self.paused = True
+        # A pause between `continue` and its run must not replace the run.
         self.run_after = self.run_after or partial(self._stopped, "interrupted")
 
     def _thread(self, given: Message) -> int:
@@ -406,6 +413,7 @@ class Adapter:
             self.progress_at_s = 0.0
             if self.progress > 0:
                 self._event("progressEnd", progressId=str(self.progress))
+            # Negative: none is shown. The number stays, because the next one needs another.
             self.progress = -abs(self.progress)
 
     def _tell_progress(self) -> None:
@@ -443,6 +451,7 @@ class Adapter:
         """Answers what comes during a run; true where that ends it."""
         if self.began:
             self._tell_progress()
+        # {}: nothing has come; None: the client has gone, and the run must not go on without it.
         while not self.paused and (request := self.wire.next(wait=False)) != {}:
             if request is None:
                 self.paused = True
@@ -452,6 +461,7 @@ class Adapter:
             elif request["command"] in _WHILE_IT_RUNS:
                 self.answer(request)
             else:
+                # What looks at memory or moves would do so in the middle of a search.
                 self._respond(request, refused="the run is under way: pause it first")
         return self.paused
 
@@ -462,6 +472,7 @@ class Adapter:
         kind = next(
             (breakpoint.kind for breakpoint in self.its.breakpoints if breakpoint.number == number), ""
         )
+        # References of the last stop lead to values of another moment; the protocol lets them end here.
         self.children.clear()
         self._event(
             "stopped",
@@ -492,6 +503,7 @@ class Adapter:
         if not frames[-1].known:
             label = {"id": 0, "name": "the stack cannot be told from here on", "presentationHint": "label"}
             replies.append({**label, "line": 0, "column": 0})
+        # 0 levels are all of them (protocol, StackTraceArguments).
         first = given.get("startFrame") or 0
         last = first + (given.get("levels") or len(replies))
         return {"stackFrames": replies[first:last], "totalFrames": len(replies)}
@@ -609,6 +621,7 @@ class Adapter:
         if given.get("context") != "repl" or not is_command(text, self.symbols.known):
             value = expression(text)(self._moment(given.get("frameId")))
             return self._shown(lambda: value, text, "result")
+        # A command of the console may delete what the editor has set: its red dot has to go, too.
         there = self.its.breakpoints[:]
         self._watched_run(partial(do, self.session, text))
         for breakpoint in there:
@@ -633,6 +646,7 @@ class Adapter:
         return {"targets": [{"label": word, **where} for word in words]}
 
     def on_readMemory(self, given: Message) -> Message:
+        # Instructions have an address alone; variables say thread and memory too.
         thread, space, place = ["0", "code", *given["memoryReference"].split(":")][-3:]
         moment = Moment(self.symbols, self.timeline.cores[int(thread)])
         first = int(place, 16) + (given.get("offset") or 0)

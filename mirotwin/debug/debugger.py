@@ -159,6 +159,7 @@ class Debugger:
     ) -> Breakpoint:
         term = expression(condition, self.symbols.known) if condition else None
         if not more.get("watched"):
+            # What accesses a watched place lies anywhere: in some of these functions the names are unknown.
             self._refuse_unknown(condition, addresses)
         counts = _counting(count) if count else None
         self._numbers += 1
@@ -192,6 +193,7 @@ class Debugger:
         on_stack = self._is_on_stack(written)
         writers = written.writers(self.symbols.image.code, self.symbols.instructions, on_stack)
         pushed = on_stack or (written.space, written.first) == ("sfr", SFRS["SP"])
+        # The hardware's LCALL writes without an instruction: it is seen at the first one of the routine.
         return writers | self.symbols.unwinder.vectors if pushed else writers
 
     def _readers(self, read: Bytes) -> Collection[int]:
@@ -235,6 +237,7 @@ class Debugger:
                 if pc in breakpoint.addresses and self._stops(breakpoint, core)
             ]
             if stops:
+                # All were asked, not only the first: each counts its hits and writes its log.
                 return stops[0]
             if step is not None and core is self.timeline.core and pc in step.addresses:
                 return step.ask(core)
@@ -261,8 +264,10 @@ class Debugger:
         position = (core.cpu.cycles, self.timeline.cores.index(core))
         if breakpoint.count is not None:
             hit = self._numbered(position)
+            # A search passes a stretch twice, looking and landing: the second time is no new hit.
             if not breakpoint.hits or hit > breakpoint.hits[-1]:
                 breakpoint.hits.append(hit)
+            # By its place in time, not by how many were seen: going back, the fifth hit is still the fifth.
             if not breakpoint.count(bisect.bisect_left(breakpoint.hits, hit) + 1):
                 return False
         if breakpoint.log is not None:
@@ -283,6 +288,7 @@ class Debugger:
                     whole = self.timeline.at_begin
                 if not whole:
                     return False
+                # Found latest first; `_stops` looks hits up in the order of time.
                 point.hits, point.counted_to = hits[::-1], self.timeline.tick
         return True
 
@@ -347,6 +353,7 @@ class Debugger:
         if is_true():
             return f"{text} is true here"
         network, slot, begin_tick = core.device.network, core.device.slot, self.timeline.tick
+        # First each millisecond: asking before each instruction of a whole run takes minutes.
         if self.timeline.until(When(predicate=met, network=network, slot=slot)) is not None:
             millisecond = self.timeline.run.tick_hz // 1000
             self.timeline.go_to(max(begin_tick, self.timeline.tick - millisecond - 1))
@@ -361,6 +368,7 @@ class Debugger:
         here, interrupted = self.timeline.here, self.timeline.interrupted
         if step is not None and here[0] == self._stopped_at[0]:
             here = max(here, self._stopped_at)  # of another processor, in the same cycle
+        # `changed`: an editor may set breakpoints while this runs; the search starts over with them.
         hit, self.changed = None, True
         with self.timeline.interrupted_by(
             lambda: interrupted() or self.changed or bool(self._fault_since(here))
@@ -389,9 +397,12 @@ class Debugger:
         self.told.clear()
         here, known = self.timeline.here, self._reported_there
         hit = self._search(self.timeline.find, step)
+        # The logs at the place where it stood have been asked again, and were reported when it stopped there.
         outputs = sorted(output for output in self.told if output[:2] != here or output not in known)
+        # Other processors ran on to the end of the piece: what they logged behind the hit comes again later.
         self.told = [output for output in outputs if hit is None or output[:2] <= hit[:2]]
         fault = self._fault_since(here)
+        # The search ends after the piece in which the fault is: a breakpoint before it goes first.
         if fault is not None and (hit is None or fault[0] < hit[:2]):
             self.timeline.land(Hit(*fault[0], fault[1]))
             return f"firmware fault: {fault[1]}"
@@ -422,9 +433,11 @@ class Debugger:
         cpu, pc, sp = self.cpu, self.cpu.pc, self.cpu.sp
         if over and is_call(cpu.code_at(pc)):
             after = (pc + LENGTH[cpu.code_at(pc)]) & 0xFFFF
+            # SP too: a function that calls itself comes back to this address from deeper calls first.
             return self._forward(Trap({after}, lambda core: core.cpu.sp == sp or None))
         slept = cpu.idle
         self.timeline.step()
+        # An interrupt instead of the instruction: `next` passes over its routine as over a call.
         if over and cpu.sp == sp + 2 and self.frames()[0].by_interrupt:
             why = self._out()
             return why if slept or why != STEPPED else self._instruction(over)
@@ -452,11 +465,13 @@ class Debugger:
 
     def _out(self) -> str:
         inner, outer = self._caller()
+        # The return address is off the stack then; of a recursion only this call has that SP.
         return self._forward(Trap({outer.pc}, lambda core: core.cpu.sp == inner.base - 2 or None))
 
     def _out_back(self) -> str:
         """To the call, or to where the interrupt came."""
         inner, _ = self._caller()
+        # At its first instruction already, a search back would find the call before this one.
         if self.cpu.pc != inner.entry or self.cpu.sp != inner.base:
             entered = Trap({inner.entry}, lambda core: core.cpu.sp == inner.base or None)
             if self.timeline.find_back({self.timeline.focus: entered}) is None:
@@ -484,6 +499,7 @@ class Debugger:
         def ask(core: Core) -> object:
             nonlocal around
             there = self._line_of(core.cpu)
+            # An interrupt, or a call, came in between: its lines are not those that one steps through.
             if there.level > around.level or (over and there.base > around.base):
                 return None
             if there.base < around.base:
@@ -518,6 +534,7 @@ class Debugger:
             begin, line = hit, there
             if there.entered:
                 break
+            # Once it is out of a function, that function's earlier calls are not entered again.
             outermost = min(outermost, there.base)
         if begin is None:
             return self._at_begin()

@@ -150,17 +150,21 @@ class Timeline:
         )
         self.kept_bytes += len(state)
         if self.kept_bytes > BUDGET_BYTES:
+            # Never the first one: without it the begin of the run cannot be reached any more.
             del self._checkpoints[1 : len(self._checkpoints) // 2 : 2]
             self.kept_bytes = sum(len(checkpoint.state) for checkpoint in self._checkpoints)
 
     def _load(self, index: int) -> None:
         checkpoint = self._checkpoints[index]
         self._restore(checkpoint.state)
+        # What came after the checkpoint comes again: it must not be in the logs twice.
         for log, end in zip(self._logs, checkpoint.log_ends, strict=True):
             log.cut(end)
+        # Later puts are not in that state: without them going on would be another run.
         for put in self._puts[checkpoint.puts :]:
             self.run.world.do(put)
         for core in self.cores:
+            # The list is no state, the count is: faults from after this moment would be reported here.
             del core.device.board.faults[core.device.board.fault_count :]
 
     def _before(self, tick: int) -> int:
@@ -185,6 +189,7 @@ class Timeline:
         put = Put(world.earliest_action_tick, device.network, device.slot, path, value)
         world.do(put)
         self._puts.append(put)
+        # States from now on were saved without the put.
         self._checkpoints = [checkpoint for checkpoint in self._checkpoints if checkpoint.tick < self._now]
         self.kept_bytes = sum(len(checkpoint.state) for checkpoint in self._checkpoints)
         self._save()
@@ -197,7 +202,9 @@ class Timeline:
 
         `stops` is called between two pieces: true ends it where it is.
         """
+        # `+ 1`: a checkpoint on the tick itself is the nearest.
         index = self._before(tick + 1)
+        # Forward, with no checkpoint in between, it goes on from here: loading would throw work away.
         if not self._checkpoints[index].tick <= self._now <= tick:
             self._load(index)
         self._run_to(tick, stops)
@@ -218,6 +225,7 @@ class Timeline:
     def _run_to(self, tick: int, stops: Callable[[], bool] = lambda: False) -> None:
         while self._now < tick and not self.run.over:
             end_tick = self.run.world.period_end
+            # In periods, or nothing would be saved on the way and Ctrl-C would wait for the end of the run.
             self.run.to(min(tick, end_tick))
             if self._now == end_tick:
                 self._save()
@@ -253,6 +261,7 @@ class Timeline:
         cpu, cycle = self.core.cpu, self.core.cpu.cycles
         self._look_closely(self.tick)
         begin_tick = (cycle - _LONGEST_CYCLES) * CYCLE_TICKS  # where no checkpoint is past the instruction
+        # One instruction cannot be undone: it is found by doing those before it again, one by one.
         self._load(self._before(begin_tick + 1))
         self._run_to(begin_tick)
         before = -1
@@ -262,6 +271,7 @@ class Timeline:
         if before < 0:
             return False
         self.go_to(before * CYCLE_TICKS)
+        # Asleep each cycle is a moment of its own: going back by one would take millions of steps.
         if asleep and self.find_back({self.focus: Trap(self.everywhere, lambda core: True)}):
             self.step()
         return True
@@ -295,6 +305,7 @@ class Timeline:
         None, at the end of the run or where it was interrupted, if there is none.
         """
         here = after or self.here
+        # Later than here: the trap at which it stands is asked again before the first instruction.
         with self._asking(traps, lambda hit: hit[:2] > here) as hits:
 
             def later() -> list[Hit]:
@@ -303,6 +314,7 @@ class Timeline:
             self._run_to(NEVER_TICK, lambda: bool(later()) or self.interrupted())
             if not later():
                 self._settle()
+        # Processors run one after the other in a piece: the first hit that was listed may be a later one.
         hit = min(later(), key=_ORDER, default=None)
         if hit is not None:
             self.land(hit)
@@ -325,6 +337,7 @@ class Timeline:
             if self._now < end_tick and not self.run.over:  # of this stretch the latest hits are missing
                 begin_tick = end_tick - 1
                 break
+            # All of a stretch are kept: which is the latest is known only at its end.
             hits.sort(key=_ORDER, reverse=True)
             yield from (hit for hit in hits if hit[:2] < here)
             end_tick, first = begin_tick, first or self.interrupted()
@@ -343,6 +356,7 @@ class Timeline:
             end_tick = self.run.world.period_end
             if self.run.end_tick is not None:  # of an image it may lie within a period
                 end_tick = min(end_tick, self.run.end_tick)
+            # One period at a time: between two waits the state is saved, and an interruption is seen.
             with suppress(WaitExpired):
                 event = self.run.world.run_until(condition, end_tick - self._now)
                 self._settle()
@@ -384,6 +398,7 @@ class Timeline:
         try:
             yield hits
         finally:
+            # Also after an exception: marks that stay would stop every later run there.
             for watcher in asking:
                 watcher.detach()
 

@@ -169,16 +169,20 @@ class RobotPort:
         self._virtual = getattr(self._serial, "virtual_tick", None) is not None
 
     def __enter__(self) -> RobotPort:
+        # Only while a port is open: a thread of that priority that spins stops the whole PC.
         self.prompt = not self._virtual and realtime_priority()
         return self
 
     def __exit__(
         self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
     ) -> None:
+        # A second Ctrl-C must not break off the stop frames: a robot would drive on for its 110 ms.
         with held_signals():
+            # First of all, whatever went wrong: the rest takes time, in which the last command is valid.
             self.stop()
             realtime_priority(False)
             self._keep(self._decoder.flush(), self._received_tick)
+            # A period more: the one with the last character is not over yet, and would not be written.
             self._record(max(self._now, self.free_tick, self._end_tick) + CONTROL_PERIOD_TICKS)
             with suppress(*PORT_ERRORS):
                 self._serial.close()
@@ -213,6 +217,7 @@ class RobotPort:
         """Waits until then, and reads. Raises PortError."""
         while (remaining := tick - self.tick) > 0:
             self._take(self._read(remaining))
+        # What came on the last tick belongs to it; without this a wait for 0 ticks reads nothing.
         self._take(self._read(0))
 
     def run_for(self, for_ticks: int) -> None:
@@ -252,11 +257,13 @@ class RobotPort:
         require(self, "a transmission", "bad stop" if bad_stop else None)
         if at_tick is not None:
             self.run_to(at_tick)
+        # Before anything leaves: a frame that may move a robot is refused whole.
         numbers = self.guard.check(data, f"tick {self.tick}")
         now = self._now
         with self._port_errors():
             if self._blocked:  # how much of what was sent last is on its way is not known
                 raise serial.SerialTimeoutException
+            # The system's buffer takes it at once, the line only when it is free.
             sent = Transmission(max(now, self.free_tick), DOWN, data)
             self.free_tick = (
                 sent.end_tick
@@ -286,6 +293,7 @@ class RobotPort:
         """Sends these at their ticks, and reads meanwhile and a little longer; `each` gets the tick of each end."""
         for transmission in sent:
             for start in range(0, len(transmission.data), PIECE_BYTES):
+                # In pieces: what is in the system's buffer cannot be taken back by `stop`.
                 due = transmission.tick + start * HOST_CHARACTER_TICKS - (LEAD_TICKS if start else 0)
                 self.inject(transmission.data[start : start + PIECE_BYTES], at_tick=due)
             self._record(self._now - SETTLED_TICKS)
@@ -294,6 +302,7 @@ class RobotPort:
 
     def stop(self) -> None:
         """Takes back what waits, and tells all robots to stand. A lost port is opened again for it, if it can be."""
+        # The adapter may be within a frame: stop frames have to be enough for one to be read whole.
         unsent_ticks = max(0, self.free_tick - self._now) + ADAPTER_TICKS
         frames = self.guard.stop_frames(unsent_ticks // HOST_CHARACTER_TICKS)
         for _ in range(REOPENINGS):
@@ -302,9 +311,11 @@ class RobotPort:
                     self._serial = _opened(self.url)
                 if not self.url.lower().startswith("rfc2217:"):  # it would wait up to 3 s for a confirmation
                     with suppress(*PORT_ERRORS):
+                        # Commands that are not sent yet would move the robots after the stop.
                         self._serial.reset_output_buffer()
                 self._serial.write(frames)
                 if not self._virtual:
+                    # Closing drops what is not sent yet, on many systems.
                     time.sleep(len(frames) * HOST_CHARACTER_TICKS / TICKS_PER_SECOND)
                 return
             with suppress(*PORT_ERRORS):
@@ -323,6 +334,7 @@ class RobotPort:
             if counted := self._who_answers(robots, sent):
                 self.slots, self._counted = tuple(sorted(counted)), counted
                 self.began_tick = self._now
+                # Answers to the greeting must not end the first wait of a test.
                 self.waits.forget()
                 return robots
         self._keep(self._decoder.flush(), self._received_tick)
@@ -338,6 +350,7 @@ class RobotPort:
             for event in decoder.feed(transmission.data)
             if isinstance(event, Received)
         )
+        # Well before the first number that follows: a robot drops a frame whose number is not newer.
         seq = (next(numbers, 0) - APART - ROUNDS * robots) % SEQ_MODULUS
         self.run_to(BOOT_TICKS)
         for _ in range(ROUNDS * robots):
@@ -396,12 +409,14 @@ class RobotPort:
 
     def _take(self, data: bytes) -> None:
         now = self._now
+        # A port that floods (a stuck adapter, /dev/zero) would fill memory and never let `run_to` end.
         room = BURST_BYTES + now // LEAST_CHARACTER_TICKS - self._came
         self.dropped += max(0, len(data) - room)
         data = data[: max(0, room)]
         if not data:
             return
         self._came += len(data)
+        # A frame whose rest was lost: else its begin would swallow the next answer.
         if now - self._received_tick > CUT_TICKS and self._decoder.pending:
             self._keep(self._decoder.flush(), self._received_tick)
         self._received_tick = now
@@ -411,6 +426,7 @@ class RobotPort:
 
     def _keep(self, decoded: Iterable[Decoded], now: int) -> None:
         for item in decoded:
+            # Not before the end of the last: adapters hand over several at once, and a line carries one.
             came = Transmission(
                 max(self._end_tick, now - len(item.data) * character_ticks(UP)), UP, item.data
             )
@@ -456,6 +472,7 @@ class RobotPort:
         """Writes the periods that are over by then: what is broken off is there up to there."""
         if self.recorder is None:
             return
+        # Answers are dated back to their first character: one may begin before what was sent while it came.
         self.wire.sort(key=lambda sent: sent.tick)
         done = 0
         while (end_tick := (self._recorded + 1) * CONTROL_PERIOD_TICKS) <= until_tick:

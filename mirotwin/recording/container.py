@@ -84,13 +84,16 @@ class Records:
             if len(head) < _HEAD.size:
                 self._cut(head[0] if head else None)
             opcode, size = _HEAD.unpack(head)
+            # Before it is read: one turned bit of a length asks for terabytes.
             if size > LONGEST:
                 self._damaged(f"its length says {size} bytes")
             body = self._read(size)
+            # Not an error yet: of a chunk that was cut, the whole records are given out first.
             whole = len(body) == size
             try:
                 for record in _in(opcode, body, whole):
                     yield self.offset, record
+            # Not one of `_BAD`: the file is whole, and needs another remedy.
             except _Compressed as compressed:
                 remedy = "make an uncompressed copy of the file with `mcap decompress`"
                 self._fail(f"a chunk is compressed ({compressed}), which this program does not read", remedy)
@@ -98,6 +101,7 @@ class Records:
                 self._damaged(f"{error}".strip().split("\n")[0] or type(error).__name__)
             if not whole:
                 self._cut(opcode)
+            # Only now: records of a chunk have a CRC of their own; this one is of the whole file.
             self._check(opcode, head, body)
             self.offset += len(head) + len(body)
         self._end()
@@ -146,6 +150,7 @@ class Records:
         """The file ended before the record did, or (`within` None) before there was one."""
         if self.last == MAGIC:  # as a whole file ends; so what is wrong is a length
             self._damaged("its length is more than the file holds")
+        # Our writer leaves only these at the end of a broken file (writer.py); after DataEnd it is no run.
         if not self.data_ended and (within is None or within in _IN_CHUNKS):
             reason = "the recording has no end: the run that wrote it was broken off"
             raise BrokenOff(
@@ -184,6 +189,7 @@ def _in_chunk(body: bytes, whole: bool) -> Iterator[McapRecord]:
         return
     _, _, size, checksum, name_length = _CHUNK.unpack_from(body)
     if name_length:
+        # At most 16: a damaged length would put the whole chunk into the message.
         name = body[_CHUNK.size : _CHUNK.size + min(name_length, 16)]
         if (
             name not in _COMPRESSIONS
@@ -206,6 +212,7 @@ def _in_row(body: bytes, offset: int, whole: bool) -> Iterator[McapRecord]:
     while offset + _HEAD.size <= len(body):
         opcode, size = _HEAD.unpack_from(body, offset)
         first, end = offset + _HEAD.size, offset + _HEAD.size + size
+        # Of a chunk that was cut this is its end; of a whole one the test below is reached.
         if end > len(body):
             break
         if opcode == Opcode.CHUNK:

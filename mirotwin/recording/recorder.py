@@ -122,11 +122,14 @@ class Recorder:
                 **({"source": source.origin} if source.origin else {}),
                 **({"plugins": "\n".join(source.plugins)} if source.plugins else {}),
                 **({"board": source.board} if source.board else {}),
+                # Only where it is another one: recordings of robots keep the bytes that they always had.
                 **({"crystal_hz": f"{source.crystal_hz}"} if source.crystal_hz != TICKS_PER_SECOND else {}),
             },
         )
+        # Before the first message: a recording that is broken off anywhere can still be run again.
         self._writer.add_attachment(SCENARIO_ATTACHMENT, "application/toml", source.scenario_text.encode())
         self._writer.add_attachment(FIRMWARE_ATTACHMENT, "text/plain", source.firmware)
+        # In a fixed order: else the bytes of two equal runs differ with the order in which symbols were read.
         symbols = msgspec.json.encode(source.symbols, order="deterministic")
         self._writer.add_attachment(SYMBOLS_ATTACHMENT, "application/json", symbols)
         if source.resumed:
@@ -141,6 +144,7 @@ class Recorder:
         with self._undisturbed:
             try:
                 self._write_waiting()
+            # What waits may be what is wrong: the file still gets its end, and says that it was broken off.
             except Exception as unwritten:
                 self._end(unwritten)
                 raise
@@ -149,6 +153,7 @@ class Recorder:
     def _end(self, error: BaseException | None) -> None:
         """Writes the end of the file; `error` broke the run off."""
         if error is not None:
+            # Only errors that we wrote: the text of another may hold an address in memory.
             reason = {"reason": str(error)} if isinstance(error, BadInput) else {}
             self._writer.add_metadata(BROKEN_OFF, {"by": type(error).__name__, **reason})
         self._writer.finish()
@@ -156,6 +161,7 @@ class Recorder:
     def flush(self) -> None:
         """Saves what was added up to now, even if this process is killed."""
         with self._undisturbed:
+            # First: the writer does not know what waits here, and a kill would lose it.
             self._write_waiting()
             self._writer.flush()
 
@@ -164,6 +170,7 @@ class Recorder:
         now_s = time.monotonic()
         if now_s - self._flushed_s >= FLUSH_S:
             self.flush()
+            # Not before the flush: one that failed would count as done.
             self._flushed_s = now_s
 
     def write(self, item: Period | Message) -> None:
@@ -178,6 +185,7 @@ class Recorder:
         self.write((channels.topic_name(channel, network, slot), message.tick, message))
 
     def _write_waiting(self) -> None:
+        # Taken out before it is written: an error in it would write it a second time at the end.
         waiting, self._waiting = self._waiting, []
         self._rows.write_all(waiting)
 
@@ -198,6 +206,7 @@ class Recorder:
         """Notes the length of the bits that the host of a board sends, as soon as it is known."""
         with self._undisturbed:
             self._write_waiting()
+            # After what waits: metadata ends the chunk, and where chunks end must not depend on flushes.
             self._writer.add_metadata(SERIAL, {"bit_ticks": f"{bit_ticks}"})
 
     def write_image(self, network: int, tick: int, png: bytes) -> None:
@@ -209,6 +218,7 @@ class Recorder:
         """A channel for messages like this one. A second law's inner values make the schema `mirotwin.Control2`."""
         kind = type(message)
         text = channels.schema_text(kind, channels.inner_of(message))
+        # By text: two laws give one message type with other inner values, which needs a schema each.
         if text not in self._schemas:
             name = channels.schema_name(kind)
             number = self._named[name] = self._named.get(name, 0) + 1

@@ -59,6 +59,7 @@ class McapWriter:
     def add_attachment(self, name: str, media_type: str, data: bytes) -> None:
         """Adds a file; its times are 0."""
         self._end_chunk()
+        # After `_end_chunk`, which moves the end: an attachment cannot stand in a chunk.
         offset, names = self._end, _text(name) + _text(media_type)
         content = struct.pack("<QQ", 0, 0) + names + struct.pack("<Q", len(data)) + data
         self._put(_record(Opcode.ATTACHMENT, content, struct.pack("<I", crc32(content))))
@@ -92,6 +93,7 @@ class McapWriter:
 
     def flush(self) -> None:
         """Brings everything so far into the file, so that it outlives this process."""
+        # Schemas and channels alone are no chunk: the library's writer would not have written one.
         if self.chunk.indexes:
             self._store_chunk()
         self._stream.flush()
@@ -108,6 +110,7 @@ class McapWriter:
             offsets += _record(Opcode.SUMMARY_OFFSET, place)
             summary += records
         footer = _record(Opcode.FOOTER, struct.pack("<QQI", start, start + len(summary), 0))[:-_CRC]
+        # From the summary to the footer's own CRC, head and length of the footer included (MCAP, Footer).
         checksum = crc32(footer, crc32(offsets, crc32(summary)))
         self._put(summary + offsets + footer + struct.pack("<I", checksum) + MAGIC)
         self._stream.flush()
@@ -135,6 +138,7 @@ class McapWriter:
         head, chunk = self._store_chunk(), self.chunk
         start, size = self._end, self._stored
         self._end = start + len(head) + size
+        # Only now, with the last head: the ones before were written over.
         self._checksum = crc32(chunk.data, crc32(head, self._checksum))
         offsets, rows = {}, bytearray()
         for channel, index in chunk.indexes.items():
@@ -148,6 +152,7 @@ class McapWriter:
         place = struct.pack("<4Q", chunk.first_ns, chunk.last_ns, start, len(head) + size)
         sizes = struct.pack("<QIQQ", len(rows), 0, size, size)  # 0: no name of a compression
         self._chunks.append(_record(Opcode.CHUNK_INDEX, place, _by_channel(offsets), sizes))
+        # Last: the index above is of its data and times.
         chunk.begin()
         self._stored = 0
 
@@ -158,8 +163,10 @@ class McapWriter:
             self._write(self._end, self._chunk_head(b""))
         head = self._chunk_head(data)
         if len(data) > stored:
+            # Only what is new, or a flush would write up to 1 MiB again each 0.2 s.
             self._write(self._end + len(head) + stored, data[stored:])
             self._stream.flush()
+            # After the records have left this process: a head that counts missing ones is a damaged file.
             self._write(self._end, head)
             self._stream.flush()
         self._stored = len(data)
@@ -176,12 +183,14 @@ class McapWriter:
         self._checksum = crc32(data, self._checksum)
 
     def _write(self, place: int, data: bytes | bytearray) -> None:
+        # Anything further would stand behind a gap, and a second error would hide the first.
         if self._failed:
             return
         rest = memoryview(data)
         try:
             self._stream.seek(place)
             while rest:
+                # A raw stream may take a part only.
                 rest = rest[self._stream.write(rest) :]
         except OSError:
             self._failed = True

@@ -74,6 +74,7 @@ class Host(FrameSender):
 
     def begin(self, every_ticks: int, frames: int | None, ask: bool) -> None:
         """Frames from now on, with the velocities that were sent or commanded last."""
+        # Kept for all frames of the stream: how long before its start bit a frame has to be announced.
         self.due_tick = self.machine.earliest_tick(self.network)
         self.lead_ticks = self.due_tick - self.machine.tick
         self.every_ticks, self.ask, self.remaining = every_ticks, ask, frames
@@ -135,6 +136,7 @@ class Player:
         self.machine = machine
         lines = [(step, why_not(machine, step, step.needs)) for step in steps]
         self.unseen = [line for _, line in lines if line]
+        # Behind a step that changes the run and cannot be done, the rest would judge another run.
         to_change = takewhile(lambda both: not (both[1] and both[0].CHANGES), lines)
         self.steps = [step for step, line in to_change if not line]
         self.count = len(steps)
@@ -148,6 +150,7 @@ class Player:
         self.proofs: list[Proof] = []  # of faults
         self.found = ""  # what pins, values and text were in the last wait
         self.pressed: dict[str, int] = {}  # until which tick a button is
+        # Before the first instruction: how long a level lasts is not known without the edge that began it.
         self._watch_pins()
 
     @property
@@ -170,6 +173,7 @@ class Player:
         for step in self.steps[self.done :]:
             begun_tick = self.machine.tick
             try:
+                # Not passed over: a step that was never done would count as one that was fulfilled.
                 if self.machine.finished:
                     raise _Failed(begun_tick, "to be done", self._end())
                 step.do(self)
@@ -178,6 +182,7 @@ class Player:
                 self.failure = msgspec.structs.replace(failure, clock=self.machine.clock)
                 return
             except ValueError as error:
+                # It names the file already.
                 if isinstance(error, ScenarioError):
                     raise
                 reason, _, remedy = f"{error}".removeprefix(f"{self.origin}: ").partition("; ")
@@ -189,6 +194,7 @@ class Player:
         """Runs to the end; what goes on by itself goes on. Ends the checks that steps began."""
         machine = self.machine
         while not machine.finished:
+            # Not past the next frame of a stream: a frame cannot be announced for a tick that is settled.
             machine.run_to(min(machine.period_end, self._next_tick()))
             self._top_up()
         for checks in self.checks:
@@ -213,6 +219,7 @@ class Player:
         event = self._next(kind, until_tick, earlier)
         if event is None:
             raise _Failed(machine.tick, awaited, self._nothing(wanted, earlier), True)
+        # The first answer decides: a later one that fits is to another question.
         if kind != wanted and not wanted.met_by(event):
             raise _Failed(event.tick, awaited, self._other(wanted, event))
 
@@ -227,6 +234,7 @@ class Player:
                 network=condition.network, slot=condition.slot, predicate=lambda robot: not holds(robot)
             )
             required = f"{condition}"
+        # First: a `put` of the step before takes 120 ticks, and would itself break the hold.
         self._let_act()
         self._forget()
         until_tick = machine.tick + self.ticks(for_ms)
@@ -250,6 +258,7 @@ class Player:
 
     def _forget(self) -> None:
         """Passes over the events up to now."""
+        # Collect first: `pass_over` leaves out only what has been read from the logs.
         self.machine.waits.collect()
         self.machine.waits.pass_over()
 
@@ -257,6 +266,7 @@ class Player:
         """The next event for which `condition` is true, up to `until_tick`; `earlier` gets those before it."""
         machine, self.found = self.machine, ""
         while True:
+            # In stretches, because a stream of frames goes on while a step waits.
             stop_tick = min(until_tick, self._next_tick())
             within = None if stop_tick == NEVER_TICK else max(0, stop_tick - machine.tick)
             try:
@@ -265,6 +275,7 @@ class Player:
                 self.found = expired.found
                 earlier += expired.seen
                 del earlier[:-SEEN_AT_MOST]
+            # After the wait, not before: with 0 ms left an event of this tick still counts.
             if machine.finished or machine.tick >= until_tick:
                 return None
             self._top_up()
@@ -273,6 +284,7 @@ class Player:
         """Lets time pass; the next wait also sees the events of this time."""
         machine, until_tick = self.machine, self.machine.tick + self.ticks(for_ms)
         while machine.tick < until_tick and not machine.finished:
+            # Once a period: a log holds 2048 events, and the next wait would miss the first.
             longest_tick = machine.tick + CONTROL_PERIOD_TICKS
             machine.run_to(min(until_tick, longest_tick, self._next_tick()))
             machine.waits.collect()
@@ -313,6 +325,7 @@ class Player:
         """Presses a button, and lets it go later."""
         machine = self.machine
         tick = machine.earliest_action_tick
+        # Its release waits already, and would let this press go too early.
         if tick <= self.pressed.get(button, -1):
             until = in_ms(self.pressed[button], machine.clock)
             raise ValueError(f"{button} is pressed until {until}; let it go before, by pause_ms")

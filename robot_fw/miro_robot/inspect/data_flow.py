@@ -58,9 +58,11 @@ def effect(code: bytes, address: int, bank: int) -> Effect:
         source = places.get(words[-1], ()) if mnemonic == "MOV" else ()
         reads |= set(source)
         moves = tuple(zip(to, source, strict=False))
+    # XCH A,@Ri swaps with a place that is not known here: only A is written, from anywhere.
     elif mnemonic == "XCH" and words[1] != "@Ri":
         here, other = to[0], places[words[1]][0]
         writes, moves = {here, other}, ((here, other), (other, here))
+    # The pointer is read, also where what it points to is written.
     through = "".join(word for word in words if "@" in word)
     reads |= {bank + (opcode & 1)} if "Ri" in through else {DPL, DPH} if "DPTR" in through else set()
     reads |= {A} if "A+" in through else set()
@@ -87,6 +89,7 @@ class Callees:
         if (entry, bank) not in self._known:
             code, written, called = self.reader.code, set[int](), []
             reached = self.reader.heights(entry)
+            # A jump table may lead anywhere: then nothing survives the call.
             if not reached or any(code[address] == JMP_TABLE for address in reached):
                 written |= set(places_of(bank))
             for address in reached:
@@ -117,6 +120,7 @@ class Flow:
             to = target(reader.code, address) if is_call(reader.code[address]) else None
             if to is not None:  # arguments may be in any of these; SP comes back as it was
                 called = Effect(does.mnemonic, frozenset((A, B, DPL, DPH)), callees.writes(to, bank) - {SP})
+                # In place of LCALL's own: only then do the registers after a call hold what the callee left.
                 self.effects[address] = called
         self.after = {
             address: [to for to in reader.successors(address) if to in reached] for address in reached
@@ -144,12 +148,14 @@ class Flow:
         waiting: list[tuple[int, Held, tuple[frozenset[Origin], ...]]] = [(entry, start, ())]
         while waiting:
             address, held, stack = waiting.pop()
+            # A second way to it: each place may hold what either way brought. Sets only grow, so this ends.
             if address in known:
                 old, old_stack = known[address]
                 held = {place: _either(old[place], held[place]) for place in self.places}
                 depth = min(len(old_stack), len(stack))  # their tops are alike
                 pairs = zip(old_stack[len(old_stack) - depth :], stack[len(stack) - depth :], strict=True)
                 stack = tuple(_either(here, other) for here, other in pairs)
+                # Nothing new to hand on: without this a loop would never end.
                 if (held, stack) == (old, old_stack):
                     continue
             known[address] = held, stack
@@ -165,6 +171,7 @@ class Flow:
             after[place] = frozenset({(address, place)})
         for to, source in does.moves:
             if to in after:
+                # From a place that is not followed (RAM, a port): the value begins here.
                 after[to] = held.get(source) or frozenset({(address, to)})
         if does.mnemonic == "PUSH":
             (source,) = does.reads
@@ -172,9 +179,11 @@ class Flow:
         elif does.mnemonic == "POP":
             (to,) = does.writes
             if to in after:
+                # Popped below the entry: it is of the caller, or the stack was set by hand.
                 after[to] = stack[-1] if stack else _ANY
             stack = stack[:-1]
         elif SP in does.writes:
+            # SP was written: what a later POP gives cannot be told.
             stack = ()
         return after, stack
 
@@ -205,4 +214,5 @@ def _reached(first: Iterable[int], after: Callable[[int], Iterable[int]]) -> set
 
 def _either(here: frozenset[Origin], other: frozenset[Origin]) -> frozenset[Origin]:
     both = here | other
+    # Bounded, and `_ANY` absorbs: else a table of cases would make each step cost all of them.
     return _ANY if len(both) > _MOST_ORIGINS or both >= _ANY else both

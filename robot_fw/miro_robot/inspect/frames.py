@@ -47,12 +47,14 @@ class Unwinder:
         self._ways: dict[int, list[tuple[int, int]]] = {}  # instruction -> (height, entry) of each way to it
         self._called: set[int] = set()
         self._enter(0)
+        # Before the vectors are entered: what only they lead to is not the main program.
         self.from_reset = set(self._ways)
         self.vectors = set()
         for vector in VECTORS:
             if vector not in self.from_reset:  # start-up code may lie where no interrupt is used
                 self.vectors.add(vector)
                 self._enter(vector)  # also where the vector before runs into it, over NOP
+        # Not those that were reached: a label within a function has a height of its own, and would get 0.
         for first, _ in names.functions:
             if first not in self._ways:  # called by a pointer, if at all
                 self._enter(first)
@@ -68,6 +70,7 @@ class Unwinder:
         waiting = [entry]
         while waiting:
             entry = waiting.pop()
+            # Functions call each other in circles.
             if entry in self._called:
                 continue
             self._called.add(entry)
@@ -83,6 +86,7 @@ class Unwinder:
             address = waiting.pop()
             opcode = self.code[address]
             after = address + LENGTH[opcode]
+            # JMP @A+DPTR is followed by its table, which is no function.
             ends = not goes_on(opcode) and opcode != JMP_TABLE
             if ends and after not in self._ways and any(first <= after < end for first, end in used):
                 for place, height in self._reader.heights(after).items():
@@ -101,12 +105,15 @@ class Unwinder:
         """
         frames: list[StackFrame] = []
         pc, place, sp = cpu.pc, cpu.pc, cpu.sp
+        # Bounded: return addresses that were overwritten may lead in a circle.
         while len(frames) < _MOST_FRAMES:
             height, entry = self.heights.get(pc, (0, -1))
             base = sp - height - (by if len(frames) == shifted else 0)
             back = cpu.peek_iram(base - 1) | cpu.peek_iram(base) << 8
             by_interrupt = entry in self.vectors
+            # The hardware's call is no instruction: what is before the return address says nothing.
             call = back if by_interrupt else self.call_before(back)
+            # Without a call before it the word is data: going on would show functions that never ran.
             known = entry >= 0 and (entry == 0 or (base > 0 and call >= 0))
             frames.append(StackFrame(pc, place, entry if entry >= 0 else pc, base, by_interrupt, known))
             if entry == 0 or not known:
@@ -124,6 +131,7 @@ class Unwinder:
         whole = range(0x100) if bottom < 0 else (bottom,)
         if frames[-1].known and frames[-1].base in (*whole, RESET_SP):
             return None
+        # The fewest bytes first: with enough of them any stack can be explained.
         for size in range(1, _MOST_SHIFT + 1):
             for by in (size, -size):
                 for index in reversed(range(len(frames))):
@@ -136,6 +144,7 @@ class Unwinder:
         """Where the call stands that returns to `address`; -1 where none does."""
         for size in (_LCALL_BYTES, _ACALL_BYTES):
             place = (address - size) & 0xFFFF
+            # By size: the last two bytes of an LCALL may look like an ACALL.
             if is_call(self.code[place]) and (self.code[place] == 0x12) == (size == _LCALL_BYTES):
                 return place
         return -1
@@ -144,6 +153,7 @@ class Unwinder:
 def _agreed(ways: list[tuple[int, int]], own: int) -> tuple[int, int] | None:
     """The height that all ways to an instruction agree in; where they do not, that from the function's own begin."""
     for height, entry in ways:
+        # Paths into a shared tail arrive with other heights: what the function itself does is the likely one.
         if entry == own:
             return height, entry
     return ways[0] if len({height for height, _ in ways}) == 1 else None
