@@ -9,7 +9,7 @@ import pytest
 from hypothesis import example, given, settings
 from hypothesis import strategies as st
 
-from benchmarks.codec import best_time, own_jobs
+from benchmarks.codec import best_time, codec_jobs
 from miro_exact import engine
 from miro_protocol import decoder as module
 from miro_protocol import table
@@ -301,9 +301,9 @@ def test_without_the_spacing_rule_pauses_inside_a_frame_are_taken():
 
 @pytest.mark.skipif(engine.active() != "compiled", reason="the compiled decoder is not installed")
 def test_twenty_megabytes_a_second_of_frames_of_noise_and_of_the_worst_input():
-    """CPU time, best of a few: `python -m benchmarks.codec` measures properly and beside others."""
+    """CPU time, best of a few: `python -m benchmarks.codec` measures properly."""
     rates = {
-        name: length / best_time(job) / 1e6 for name, length, job in own_jobs(500_000) if "decoder" in name
+        name: length / best_time(job) / 1e6 for name, length, job in codec_jobs(500_000) if "decoder" in name
     }
     assert len(rates) == 5
     assert min(rates.values()) >= 20, rates
