@@ -10,7 +10,7 @@ from miro_exact.clock import CONTROL_PERIOD_TICKS, seconds
 from miro_sim.scenario.file import load
 from mirotwin.runs.result import fault_lines
 from mirotwin.runs.spec import RunSpec
-from mirotwin.shell.command import Option, Options, command_of
+from mirotwin.shell.command import Options, command_of
 from mirotwin.shell.firmware_image import load_firmware
 from mirotwin.shell.options import (
     AT,
@@ -44,7 +44,6 @@ class LookOptions(Options, frozen=True, kw_only=True):
     settings: Settings = ()
     firmware: Firmware = None
     plugins: PluginFiles = PluginFiles()
-    plain: Annotated[bool, Option(help="The picture alone, 320 x 240, as the PC gets it.")] = False
     force: Annotated[bool, FORCE] = False
     engine: Engine = None
 
@@ -86,7 +85,7 @@ def look(options: LookOptions) -> int:
         if world.finished:
             return report_lines(fault_lines(world.robots))
         drawn: list[bytes] = []
-        view.shows.append(lambda view: drawn.append(view.png(options.plain)))
+        view.shows.append(lambda view: drawn.append(view.png(plain=False)))
         world.begin_period()
     with whole_file(out, "--out") as staging:
         staging.write_bytes(drawn[0])
