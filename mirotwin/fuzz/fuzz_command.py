@@ -122,9 +122,7 @@ class FuzzOptions(Options, frozen=True, kw_only=True):
     ] = None
     faults: Annotated[
         bool,
-        Option(
-            help="Hardware of the robot breaks, too: bits of RAM turn over, LM629s hang, the supply dips."
-        ),
+        Option(help="Hardware of the robot breaks, too: RAM, LM629s, motors, wheels, port pins, the supply."),
     ] = False
     expected: Annotated[
         tuple[str, ...],

@@ -166,10 +166,16 @@ def described(item: ScriptItem) -> str:
     return str(item)
 
 
-FAULT_WAYS = ("flip", "lm629 left", "lm629 right", "power")
+FAULT_WAYS = (
+    *("flip", "lm629 left", "lm629 right", "power"),
+    *("motor left", "motor right", "wheel left", "wheel right", "pin"),
+)
 OF_BROKEN = ("no_fault", "moves_only_when_fresh", "motors_off_ms", "answers_only_in_turn")
-"""What a robot whose hardware breaks has to keep; it need not act."""
+"""What a robot whose hardware breaks has to keep; it need not act. With a stuck pin only the first: another one of P1
+makes it another robot, and one of the LM629's bus brings other commands there.
+"""
 _LM629_WAYS = ("busy", "dead", "ok")
+_PINS = [f"P{port}.{bit}" for port in range(4) for bit in range(8) if (port, bit) not in ((3, 0), (3, 1))]
 
 
 def fault_of(which: int, value: int) -> str:
@@ -177,7 +183,12 @@ def fault_of(which: int, value: int) -> str:
     way = FAULT_WAYS[which]
     if way == "flip":
         return f"flip {value >> 3 & 0xFF:02X}h.{value & 7}"
-    return "power dip" if way == "power" else f"{way} {_LM629_WAYS[value % 3]}"
+    if way == "pin":
+        return f"pin {_PINS[value // 3 % len(_PINS)]} {('0', '1', 'ok')[value % 3]}"
+    if way.startswith("lm629"):
+        return f"{way} {_LM629_WAYS[value % 3]}"
+    broken = {"power": "dip", "motor": "open", "wheel": "blocked"}[way.split()[0]]
+    return f"{way} {'ok' if value & 1 and way != 'power' else broken}"
 
 
 class Breaker:
@@ -189,6 +200,11 @@ class Breaker:
     def put(self, which: int, value: int, tick: int) -> None:
         what = fault_of(which, value)
         break_board(self.board, what)
+        word, *values = what.split()
+        if word in ("motor", "wheel"):
+            plant: Any = self.board.plant
+            bit = 1 << 2 * (word == "wheel") + (values[0] == "right")
+            plant.stopped = plant.stopped & ~bit if values[1] == "ok" else plant.stopped | bit
         if what == "power dip":
             self.oracle.restarted(tick)
 
@@ -229,7 +245,8 @@ class RobotTarget(Target):
     def run(self, data: Any) -> int:
         ended = self.play(data)
         self.code = self.oracle.code
-        if self.program.puts and NAMES[self.code] not in OF_BROKEN:
+        ways = [FAULT_WAYS[self.program.put(number)[2]] for number in range(self.program.puts)]
+        if ways and NAMES[self.code] not in (OF_BROKEN[:1] if "pin" in ways else OF_BROKEN):
             self.code = 0
             return 0
         if ended == AWAKE and not self.code:

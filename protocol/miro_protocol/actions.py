@@ -90,11 +90,19 @@ FAULTS = {
     "flip": "ADDR.BIT",
     "encoder": "left|right lost|a0|a1|b0|b1|ok",
     "lm629": "left|right busy|dead|ok",
+    "motor": "left|right open|ok",
+    "wheel": "left|right blocked|ok",
+    "pin": "PIN 0|1|ok",
     "power": "dip",
     "rxd": "inverted|0|1|ok",
 }
-"""Word -> the words that follow it, places apart by blanks. ADDR.BIT is of internal RAM: 2Ah.3."""
-_RAM_BIT = re.compile(r"[0-9a-fA-F]{2}h\.[0-7]")
+"""Word -> the words that follow it, places apart by blanks. ADDR.BIT is of internal RAM: 2Ah.3; PIN of a port: P1.3."""
+OF_BOARDS = ("flip", "pin", "power", "rxd")
+"""Words of the faults that boards of files have, too."""
+_PLACES = {
+    "ADDR.BIT": re.compile(r"[0-9a-fA-F]{2}h\.[0-7]"),
+    "PIN": re.compile(r"P(?:[0-2]\.[0-7]|3\.[2-7])"),  # P3.0 and P3.1 are the serial port's
+}
 
 
 def fault_text(text: str) -> str:
@@ -106,11 +114,13 @@ def fault_text(text: str) -> str:
             f"{word} {values[0][:2].upper()}{values[0][2:]}" if word == "flip" else " ".join([word, *values])
         )
     ways = ", ".join(f"{word} {places}" for word, places in FAULTS.items())
-    raise ValueError(f"{text[:40]!r} is no hardware fault; write one of: {ways}, with ADDR.BIT as 2Ah.3")
+    raise ValueError(
+        f"{text[:40]!r} is no hardware fault; write one of: {ways}, with ADDR.BIT as 2Ah.3, PIN as P1.3"
+    )
 
 
 def _fits(place: str, value: str) -> bool:
-    return bool(_RAM_BIT.fullmatch(value)) if place == "ADDR.BIT" else value in place.split("|")
+    return bool(_PLACES[place].fullmatch(value)) if place in _PLACES else value in place.split("|")
 
 
 def put_of(tick: int, network: int, slot: int, text: str) -> Put:

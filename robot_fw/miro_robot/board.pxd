@@ -31,6 +31,9 @@ cdef class Board(ProcessorBoard):
     cdef unsigned char bridge_enable[2]
     cdef unsigned char bridge_sign[2]
     cdef unsigned char hi_seen[2]
+    cdef int stuck
+    cdef unsigned char low_pins[4]
+    cdef unsigned char high_pins[4]
     cdef readonly BusTiming left_timing, right_timing
     cdef int on_movx_bus, data_bank
     cdef unsigned short pin_levels[3328]
@@ -46,6 +49,8 @@ cdef class Board(ProcessorBoard):
 
     @cython.locals(index=cython.int, bank=cython.int, bit=cython.int, inverted=cython.int)
     cdef _resolve_outputs(self, wiring)
+    @cython.locals(port=int)
+    cdef int _note_stuck(self) except -1
     cdef int _rest(self, BusTiming timing, Lm629 chip) except -1
     cpdef int go_on(self, long long until_tick) except -1
     @cython.final

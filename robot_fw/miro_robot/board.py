@@ -45,6 +45,7 @@ _WR, _RD = 0x40, 0x80  # pins of P3
 _CS, _BOTH_STROBES = 0x01, 0x06
 _CHIP_PINS, _ALL_PINS, _BOTH_RST = 5, 0x1F, 0x210
 _BEHIND_TICKS = 96  # more than an instruction: so far the other parts may be behind the CPU
+_AT_PINS = (FaultKind.BUS_CONTENTION, FaultKind.LM629_BUSY, FaultKind.LM629_TIMING)
 RESET_PULSE_TICKS = LIMITS[RESET_PULSE].ticks
 
 
@@ -73,7 +74,7 @@ class Board(ProcessorBoard):
     NOT_STATE = (
         "wiring", "latch_address", "latch_mask", "buffer_address", "buffer_mask", "latches", "buffers",
         "data_bank", "watched", "pin_levels", "pin_banks", "pin_bank", "hi_pins", "hi_seen", "forced",
-        "probe", "on_movx_bus", "horizon", "strobed", "reset_pins",
+        "probe", "on_movx_bus", "horizon", "strobed", "reset_pins", "stuck", "low_pins", "high_pins",
         # the bus is at rest between two instructions: `after_load` sets both to that
         "left_timing", "right_timing",
     )  # fmt: skip
@@ -112,6 +113,8 @@ class Board(ProcessorBoard):
         self.bridge_enable = bytearray(2)
         self.bridge_sign = bytearray(2)
         self.hi_seen = bytearray(2)
+        self.stuck = 0  # a port pin that something is wired to is shorted
+        self.low_pins, self.high_pins = bytearray(PORTS), bytearray(PORTS)
         self._resolve_outputs(wiring)
         self._resolve_inputs(wiring, slot, robots)
         plant.attach(self.left, self.right)
@@ -246,15 +249,6 @@ class Board(ProcessorBoard):
         self.forced = 0
         self.held = level
 
-    def dip(self) -> None:
-        """The supply falls for no time: processor and LM629 begin again, RAM keeps what it has."""
-        if self.powered:
-            ram = [self.cpu.peek_iram(address) for address in range(256)]
-            self.set_power(0)
-            for address, byte in enumerate(ram):
-                self.cpu.poke_iram(address, byte)
-            self.set_power(1)
-
     def set_power(self, on: int) -> None:
         """Switches the robot's supply off or on, between two instructions.
 
@@ -275,6 +269,25 @@ class Board(ProcessorBoard):
         self.sync(tick)
         self._drive_chips(tick)
         self.forced = 0
+
+    def hold_pin(self, port: int, bit: int, level: int) -> None:
+        """Fault, between two instructions: a port pin is shorted to ground (0), to the supply (1), or is whole (-1)."""
+        tick = self.cpu.cycles * CYCLE_TICKS
+        self._hold_pin(port, bit, level, self.external[port])
+        self._note_stuck()
+        self.forced = 1
+        self._set_pins(port, self.cpu.peripherals.ports.latches[port], tick)
+        self.forced = 0
+        if self.probe is not None:
+            self.probe.moved(tick)
+
+    def _note_stuck(self) -> None:
+        """The shorted pins that something is wired to: what the board has of the others nobody sees."""
+        self.stuck = 0
+        for port in range(PORTS):
+            self.low_pins[port] = self.stuck_low[port] & self.watched[port]
+            self.high_pins[port] = self.stuck_high[port] & self.watched[port]
+            self.stuck |= self.low_pins[port] | self.high_pins[port]
 
     # ---- from chip to bridge and CPU ----------------------------------------------------------------------
 
@@ -309,6 +322,7 @@ class Board(ProcessorBoard):
         self._set_pins(port, latch, tick)
 
     def _set_pins(self, port: int, levels: int, tick: int) -> None:
+        levels = (levels | self.high_pins[port]) & ~self.low_pins[port]
         changed = self.bank[port] ^ levels
         self.bank[port] = levels
         if changed & self.watched[port]:
@@ -480,8 +494,8 @@ class Board(ProcessorBoard):
         self._note(kind, pc, tick, self.cpu.stack_said() if kind in STACK_FAULTS else "")
 
     def _note(self, kind: int, pc: int, tick: int, detail: str) -> None:
-        # RST and the supply move pins as no firmware would: not its fault.
-        if not self.forced:
+        # RST, the supply and a shorted pin move pins as no firmware would: not its fault.
+        if not self.forced and not (self.stuck and kind in _AT_PINS):
             self.fault_count += 1
             self.log.note(FAULT, tick, kind, pc)
             if len(self.faults) < FAULTS_KEPT:
@@ -502,6 +516,8 @@ class Board(ProcessorBoard):
         next_tick = self.plant.next_tick
         if next_tick < earliest_tick or latest_tick < next_tick < NEVER_TICK:
             raise ValueError(f"the plant's next step is at tick {next_tick}, not about {earliest_tick}")
+        ProcessorBoard.after_load(self)
+        self._note_stuck()
         self.hi_seen[0] = self.left.hi
         self.hi_seen[1] = self.right.hi
         self.reset_pins = self.left.reset_level << 4 | self.right.reset_level << 9

@@ -1,19 +1,27 @@
-"""Hardware faults of a board, between two instructions: a bit of RAM, an LM629, the supply."""
+"""Hardware faults of a board, between two instructions: a bit of RAM, a port pin, an LM629, the supply."""
 
 from __future__ import annotations
 
 from miro_exact.clock import CYCLE_TICKS
 from miro_robot.board import Board
 from miro_robot.lm629.host_port import DEAD, STUCK, WHOLE
-from miro_robot.mcs51.cpu import Cpu
+from miro_robot.processor_board import ProcessorBoard
 
 LM629S = {"busy": STUCK, "dead": DEAD, "ok": WHOLE}
 
 
-def flip_bit(cpu: Cpu, where: str) -> None:
-    """Turns a bit of internal RAM over: 2Ah.3."""
-    address, bit = where.split("h.")
-    cpu.poke_iram(int(address, 16), cpu.peek_iram(int(address, 16)) ^ 1 << int(bit))
+def break_processor(board: ProcessorBoard, what: str) -> None:
+    """Does the fault if any board can have it."""
+    word, *values = what.split()
+    if word == "flip":
+        address, bit = values[0].split("h.")
+        place = int(address, 16)
+        board.cpu.poke_iram(place, board.cpu.peek_iram(place) ^ 1 << int(bit))
+    elif word == "pin":
+        level = -1 if values[1] == "ok" else int(values[1])
+        board.hold_pin(int(values[0][1]), int(values[0][3]), level)
+    elif word == "power":
+        board.dip()
 
 
 def break_board(board: Board, what: str) -> None:
@@ -21,9 +29,7 @@ def break_board(board: Board, what: str) -> None:
     # Where the chips are depends on where the run was cut; up to the processor's own time it does not.
     board.sync(board.cpu.cycles * CYCLE_TICKS)
     word, *values = what.split()
-    if word == "flip":
-        flip_bit(board.cpu, values[0])
-    elif word == "lm629":
+    if word == "lm629":
         (board.left if values[0] == "left" else board.right).port.broken = LM629S[values[1]]
-    elif word == "power":
-        board.dip()
+    else:
+        break_processor(board, what)

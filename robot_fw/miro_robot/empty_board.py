@@ -269,6 +269,15 @@ class EmptyBoard(ProcessorBoard):
         self.forced = 0
         self._begin_again()
 
+    def dip(self) -> None:
+        """See `ProcessorBoard`; external RAM keeps what it has, too."""
+        pages, fresh_pages = self.pages, self.fresh_pages
+        ProcessorBoard.dip(self)
+        self.pages = pages
+        self.fresh_pages = fresh_pages
+        if self.shared:
+            self._put_code()
+
     def hold_reset(self, level: int) -> None:
         """The chip holds itself in reset from now on (1), or lets go."""
         self.forced = 1
@@ -457,6 +466,7 @@ class EmptyBoard(ProcessorBoard):
 
     def after_load(self) -> None:
         """Code lies where it lay, in RAM if program and data share it."""
+        ProcessorBoard.after_load(self)
         if self.shared:
             self._put_code()
 

@@ -17,5 +17,7 @@ cdef class Plant:
     cpdef set_bridge(self, long long tick, int side, int enable, int forward)
 
 cdef class IdealWheels(Plant):
-    @cython.locals(chip=Lm629)
+    cdef public int stopped
+
+    @cython.locals(chip=Lm629, side=int)
     cpdef advance(self, long long tick)

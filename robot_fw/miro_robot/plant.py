@@ -58,12 +58,20 @@ class IdealWheels(Plant):
     """Wheels without mass: at each sample they are where the sample before wanted them.
 
     For firmware on its own (fuzzing, tests): with motors unplugged no wheel follows, and firmware that watches the
-    position error never drives.
+    position error never drives. `stopped`, a fault: bit 0 the left one has no current, bit 2 it is blocked; 1 and 3 the
+    right one.
     """
 
+    STATE = {"stopped": ("i", 0, 15)}
+    NOT_HASHED = ("stopped",)
+
+    def __init__(self) -> None:
+        Plant.__init__(self)
+        self.stopped = 0
+
     def advance(self, tick: int) -> None:
-        for chip in (self.left, self.right):
-            if chip is not None and chip.sample_tick == tick:
+        for side, chip in enumerate((self.left, self.right)):
+            if chip is not None and chip.sample_tick == tick and not self.stopped & 5 << side:
                 chip.encoder.counts = signed_31((chip.trajectory.position >> 16) - chip.real_position)
 
     def __repr__(self) -> str:

@@ -16,16 +16,21 @@ from miro_robot.mcs51.cpu import BREAKPOINT, Cpu
 
 
 class ProcessorBoard(Bus):
-    """A processor on a board. `faults`: the first of `fault_count`, which is a field of the subclass, in its table."""
+    """A processor on a board. `faults`: the first of `fault_count`, which is a field of the subclass, in its table, as
+    `powered` is. `stuck_low`, `stuck_high`: by port, pins that are shorted to ground, and to the supply, a fault.
+    """
 
-    STATE: dict[str, Any] = {"cpu": Cpu}
+    STATE: dict[str, Any] = {"cpu": Cpu, "stuck_low": ("4i", 0, 0xFF), "stuck_high": ("4i", 0, 0xFF)}
+    NOT_HASHED: tuple[str, ...] = ("stuck_low", "stuck_high")  # what comes of them is hashed
     NOT_STATE: tuple[str, ...] = ("log", "faults", "symbols", "stop_on_fault")
     fault_count = 0
+    powered = 1
 
     def __init__(self, stop_on_fault: bool) -> None:
         self.cpu = Cpu(self)
         self.log = EventLog()
         self.stop_on_fault = stop_on_fault
+        self.stuck_low, self.stuck_high = [0] * 4, [0] * 4
         self.faults: list[FirmwareFault] = []
         self.symbols: Symbols | None = None
 
@@ -63,6 +68,35 @@ class ProcessorBoard(Bus):
     def set_power(self, on: int) -> None:
         """Switches the supply off or on, between two instructions."""
         raise NotImplementedError
+
+    def dip(self) -> None:
+        """The supply falls for no time: all begins again, RAM keeps what it has."""
+        if self.powered:
+            ram = [self.cpu.peek_iram(address) for address in range(256)]
+            self.set_power(0)
+            for address, byte in enumerate(ram):
+                self.cpu.poke_iram(address, byte)
+            self.set_power(1)
+
+    def hold_pin(self, port: int, bit: int, level: int) -> None:
+        """Fault, between two instructions: a port pin is shorted to ground (0), to the supply (1), or is whole (-1)."""
+        raise NotImplementedError
+
+    def _hold_pin(self, port: int, bit: int, level: int, outside: int) -> None:
+        """What the processor has of it. `outside`: on the pins of that port."""
+        mask = 1 << bit
+        self.stuck_low[port] = self.stuck_low[port] & ~mask | (mask if level == 0 else 0)
+        self.stuck_high[port] = self.stuck_high[port] & ~mask | (mask if level == 1 else 0)
+        self.cpu.hold_pins(port, self.stuck_low[port], self.stuck_high[port], outside)
+
+    def is_stuck(self) -> bool:
+        """True if any pin is shorted."""
+        return self.cpu.peripherals.ports.is_stuck()
+
+    def after_load(self) -> None:
+        """The processor has the shorted pins."""
+        for port in range(4):
+            self.cpu.peripherals.ports.hold(port, self.stuck_low[port], self.stuck_high[port])
 
     def byte_received(self, value: int, stop: int, tick: int) -> None:
         """Notes a character that the serial port delivered."""

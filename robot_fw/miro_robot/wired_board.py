@@ -414,8 +414,9 @@ class WiredBoard(EmptyBoard):
         faults = sorted(self.nets.faults, key=_order_and_kind)
         self.nets.faults = []
         before = None
+        no_fault = self.forced or self.is_stuck()  # a shorted pin's, not the firmware's
         for order, kind, detail, ago in faults:
-            if (order, kind) != before and not self.forced:
+            if (order, kind) != before and not no_fault:
                 self._note_fault(kind, self.cpu.at, tick - ago, detail)
             before = (order, kind)
 
@@ -450,6 +451,15 @@ class WiredBoard(EmptyBoard):
     def _put_pin(self, port: int, bit: int, level: int, tick: int) -> None:
         self.outside[port] = self.outside[port] & ~(1 << bit) | level << bit
         self._push_port(port, self.nets.external[port] & self.outside[port], tick)
+
+    def hold_pin(self, port: int, bit: int, level: int) -> None:
+        """See `ProcessorBoard`."""
+        tick = self.cpu.cycles * CYCLE_TICKS
+        self.sync(tick - 1)
+        self._hold_pin(port, bit, level, self.pushed[port] | (_RXD if port == 3 else 0))
+        self.nets.tie(8 * port + bit, level)
+        self.nets.settle(tick)
+        self._push(tick)
 
     def value(self, name: str, key: str) -> float | int | bool | str:
         """A value of a part as it is now, of a plain type. Raises PluginError for what no file can hold (NaN,
@@ -540,6 +550,7 @@ class WiredBoard(EmptyBoard):
         self._foresee(self.output_put)
         for port in range(4):
             self.nets.latches[port] = self.cpu.peripherals.ports.latches[port] & self.output_levels[port]
+            self.nets.note_shorts(port, self.stuck_low[port], self.stuck_high[port])
         self.nets.powered = self.powered
         self.nets.restart()
         for index in range(self.latch_count):

@@ -21,7 +21,7 @@ from miro_exact.clock import (
     TICKS_PER_SECOND,
 )
 from miro_host.wheels import UNITS_PER_COUNT, Wheels, nearest
-from miro_protocol.actions import Fault, Power, RadioState, Reset, fault_text
+from miro_protocol.actions import OF_BOARDS, Fault, Power, RadioState, Reset, fault_text
 from miro_protocol.frames import ServiceFrame, TeamFrame
 from miro_protocol.table import DOWNLINK, SEQ_MODULUS, Opcode
 from miro_robot.parts.values import checked_put, leaves
@@ -520,7 +520,7 @@ class PowerStep(OfRobot, frozen=True, kw_only=True):
 
 
 class FaultStep(OfRobot, frozen=True, kw_only=True):
-    """`fault`: hardware of a robot breaks, or is mended; of a board only a bit of RAM. It has to change something."""
+    """`fault`: hardware breaks, or is mended; of a board RAM, a pin, the supply, RXD. It has to change something."""
 
     VERB = "fault"
     NEEDS = "switch"
@@ -531,9 +531,12 @@ class FaultStep(OfRobot, frozen=True, kw_only=True):
         return self._misspelt() or super().problem(network)
 
     def problem_alone(self, scenario: BoardScenario) -> str:
-        if self.fault.split()[:1] == ["flip"]:
+        word = self.fault.split()[:1]
+        if word == ["rxd"] and scenario.others:
+            return "fault: rxd: only the wire from a PC to one board can break"
+        if self._misspelt() or word[0] in OF_BOARDS:
             return self._misspelt()
-        return 'fault: a board has flip ADDR.BIT; put a value of the part, as eyes.echo = "none"'
+        return f'fault: a board has {", ".join(OF_BOARDS)}; put a value of the part, as eyes.echo = "none"'
 
     def _misspelt(self) -> str:
         try:

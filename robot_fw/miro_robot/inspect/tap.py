@@ -121,7 +121,8 @@ class BoardTap(Probe):
         """What chips put out by themselves, and the CPU's pins that follow."""
         board = self.board
         for port in range(4):
-            self._see(tick, _OUTSIDE + port, board.external[port])
+            shorted = board.cpu.peripherals.ports.stuck_high[port]
+            self._see(tick, _OUTSIDE + port, board.external[port] | shorted)
         self._look_at_chip(tick, 0)
         self._look_at_chip(tick, 1)
 
@@ -272,7 +273,7 @@ class CpuTap(Watcher):
             self.line_ticks[place] = self.begin_tick
         nets = [] if self.net_tap is None else self.net_tap.attach()
         for port in range(4):
-            self.levels[_LATCH + port] = cpu.peripherals.ports.latches[port]
+            self.levels[_LATCH + port] = cpu.peripherals.ports.driven(port)
             self.levels[_OUTSIDE + port] = 0xFF if self.net_tap is None else self.net_tap.outside[port]
         in_service = cpu.peripherals.interrupts.in_service
         for source in range(6):
@@ -293,7 +294,7 @@ class CpuTap(Watcher):
         """What an instruction may have changed: with effect from the next cycle."""
         tick = _TICKS * cpu.cycles
         for port in range(4):
-            self._see(tick, _LATCH + port, cpu.peripherals.ports.latches[port])
+            self._see(tick, _LATCH + port, cpu.peripherals.ports.driven(port))
         self._see(tick, _ASLEEP, 1 if cpu.idle or cpu.powered_down else 0)
         in_service = cpu.peripherals.interrupts.in_service
         if in_service & 1 != self.levels[_IN_SERVICE] or in_service >> 1 != self.levels[_IN_SERVICE + 1]:

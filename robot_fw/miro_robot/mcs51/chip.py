@@ -266,6 +266,12 @@ class Chip:
             self.next_event = 0
             self.limit = 0
 
+    def hold_pins(self, port: int, low: int, high: int, outside: int) -> None:
+        """Fault, between two instructions: pins are shorted (`Ports.hold`). `outside`: on the pins of that port."""
+        self.before_save()  # what was sampled before the fault was sampled without it
+        self.peripherals.ports.hold(port, low, high)
+        self.set_external(port, outside, 12 * self.cycles)
+
     def rxd_changed(self) -> None:
         """More is on RXD than when the run began."""
         self.peripherals.look_again()

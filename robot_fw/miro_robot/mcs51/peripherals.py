@@ -298,9 +298,8 @@ class Peripherals:
 
     def sample_pins(self, cycle: int) -> None:
         """S5P2 of `cycle`: what timers and interrupts see of P1 and P3."""
-        ports = self.ports
-        p1 = ports.latches[1] & ports.outside[1]
-        p3 = ports.latches[3] & ports.outside[3]
+        p1 = self.ports.pins(1)
+        p3 = self.ports.pins(3)
         changed1 = p1 ^ self.p1
         changed3 = p3 ^ self.p3
         self.p1 = p1
@@ -313,8 +312,8 @@ class Peripherals:
         """Samples bits of P1 and P3 that nothing looks at: each write is seen in the cycle after it, not by `cycle`."""
         if self.written < cycle:
             ports = self.ports
-            self.p1 = self.p1 & 0x03 | ports.latches[1] & ports.outside[1] & 0xFC
-            self.p3 = self.p3 & 0x3F | ports.latches[3] & ports.outside[3] & 0xC0
+            self.p1 = self.p1 & 0x03 | ports.pins(1) & 0xFC
+            self.p3 = self.p3 & 0x3F | ports.pins(3) & 0xC0
             self.written = cycle
 
     def _inputs_changed(self, changed1: int, changed3: int, cycle: int) -> None:
@@ -349,7 +348,7 @@ class Peripherals:
         elif port == 1 and self.timer2.drives_pin():
             self.settle(cycle + 1)
             levels &= 0xFE | self.timer2.clock_out
-        return levels
+        return self.ports.shorted(port, levels)
 
     def output_at(self, output: int, tick: int) -> int:
         """TXD (0), the data of mode 0 on RXD (1) or the clock of timer 2 on T2 (2) at `tick`, latches left out.

@@ -2,7 +2,7 @@ cimport cython
 from miro_robot.parts.part cimport Part
 
 cdef long long _NEVER
-cdef int _WAVES, _CHANGED, _DUE, _ADVANCE, _OTHER
+cdef int _SHORT, _WAVES, _CHANGED, _DUE, _ADVANCE, _OTHER
 cdef int MOST_PINS, MOST_PARTS, PORT_PINS, RELEASED, LOW
 
 
@@ -36,6 +36,7 @@ cdef class Nets:
     cdef int is_suspect[288]
     cdef readonly int suspect_count
     cdef readonly int ports[32]
+    cdef int shorts[32]
     cdef public int latches[4]
     cdef readonly int external[4]
     cdef readonly int wired[4]
@@ -79,6 +80,9 @@ cdef class Nets:
     cpdef restart(self)
     @cython.locals(net=int, index=int, part=Part)
     cpdef show_all(self)
+    @cython.locals(net=int, added=int)
+    cpdef tie(self, int number, int level)
+    cpdef note_shorts(self, int port, int low, int high)
     cdef inline int _latched(self, int number) noexcept
     cpdef observe(self, observer)
     cpdef ignore(self, observer)
@@ -130,7 +134,7 @@ cdef class Nets:
     cdef inline void _wait(self, int index) noexcept
     @cython.locals(place=int, net=int, both=int)
     cpdef list judge(self)
-    @cython.locals(number=int, port=int, mask=int, own_low=int, levels=int)
+    @cython.locals(number=int, port=int, mask=int, own_low=int, levels=int, tied=int)
     cdef inline void _show_ports(self, int net) noexcept
     @cython.locals(part=Part, pin=int, place=int, number=int)
     cpdef list drivers(self, int net)

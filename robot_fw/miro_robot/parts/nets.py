@@ -6,6 +6,7 @@
 
 Drivers, and what the level of a net is:
 
+    a short of a port pin, a fault              that of the rail, whoever drives
     a strong low, perhaps with a strong high    0   (both: contention, a fault once the tick is settled)
     a strong high                               1
     a resistor to ground                        0
@@ -37,6 +38,7 @@ from miro_robot.parts.part import Part
 MOST_WAVES = 1000
 """On one tick; more are a ring without delay."""
 _NEVER = NEVER_TICK
+_SHORT = 10_000  # more than there are drivers
 _WAVES = MOST_WAVES
 # Sizes of the arrays, which the compiler wants as numbers: 288 nets are MOST_NETS and one for each port pin, 64 parts
 # have 32 pins each.
@@ -127,6 +129,7 @@ class Nets:
         self.is_suspect = [0] * 288
         self.suspect_count = 0
         self.ports = list(netlist.ports)
+        self.shorts = [0] * 32  # by port pin: what a short adds to `lows` of its net, and takes from `highs`
         self.latches = [0xFF] * 4
         self.external = [0xFF] * 4
         self.wired = [0] * 4  # bits of a port that something is on
@@ -270,7 +273,8 @@ class Nets:
         for net in netlist.pull_downs:
             self.downs[net] += 1
         for number in range(PORT_PINS):
-            self.lows[self.ports[number]] += 1 - self._latched(number)
+            self.lows[self.ports[number]] += 1 - self._latched(number) + self.shorts[number]
+            self.highs[self.ports[number]] -= self.shorts[number]
         for index in range(self.part_count):
             part = self.parts[index]
             part.pending = part.moved = 0
@@ -284,7 +288,7 @@ class Nets:
         """The levels that all drivers make, to all who look at them, without calling anybody."""
         for net in range(len(self.all_names)):
             self.levels[net] = self._level(net, 0, 0)
-            self.contended[net] = 1 if self.lows[net] and self.highs[net] else 0
+            self.contended[net] = 1 if self.lows[net] > 0 and self.highs[net] > 0 else 0
             self.is_touched[net] = 0
             self._show(net)
             self._show_ports(net)
@@ -293,6 +297,19 @@ class Nets:
             self._look_up(index, self.parts[index])
         self.waiting_count = self.touched_count = 0
         self.ports_changed = 0
+
+    def tie(self, number: int, level: int) -> None:
+        """Fault: a port pin is shorted to ground (0), to the supply (1), or to nothing (-1): all drivers lose."""
+        net, added = self.ports[number], 0 if level < 0 else _SHORT * (1 - 2 * level)
+        self.lows[net] += added - self.shorts[number]
+        self.highs[net] -= added - self.shorts[number]
+        self.shorts[number] = added
+        self._touch(net)
+
+    def note_shorts(self, port: int, low: int, high: int) -> None:
+        """Before `restart`: the shorted pins of a port."""
+        for bit in range(8):
+            self.shorts[8 * port + bit] = _SHORT * ((low >> bit & 1) - (high >> bit & 1))
 
     def _latched(self, number: int) -> int:
         return self.latches[number >> 3] >> (number & 7) & 1
@@ -557,7 +574,7 @@ class Nets:
                 self._mark(net)
                 if self.observed[net]:
                     self._report(tick, net, level)
-            both = 1 if self.lows[net] and self.highs[net] else 0
+            both = 1 if self.lows[net] > 0 and self.highs[net] > 0 else 0
             if both != self.contended[net] and not self.is_suspect[net]:
                 self.is_suspect[net] = 1
                 self.suspects[self.suspect_count] = net
@@ -624,7 +641,7 @@ class Nets:
         for place in range(self.suspect_count):
             net = self.suspects[place]
             self.is_suspect[net] = 0
-            both = 1 if self.lows[net] and self.highs[net] else 0
+            both = 1 if self.lows[net] > 0 and self.highs[net] > 0 else 0
             if both and not self.contended[net] and net not in self.netlist.allow_contention:
                 begun.append(net)
             self.contended[net] = both
@@ -634,14 +651,15 @@ class Nets:
     # Ports
 
     def _show_ports(self, net: int) -> None:
-        """What the outside puts on the port pins of a net: its level without the port's own drive."""
+        """What the outside puts on the port pins of a net: its level without the pin's own drive, or short."""
         number = self.port_of[net]
         while number >= 0:
             port = number >> 3
             mask = 1 << (number & 7)
             own_low = 0 if self.latches[port] & mask else 1
             levels = self.external[port] & ~mask
-            if self._level(net, own_low, 0):
+            tied = self.shorts[number]
+            if self._level(net, own_low + tied, -tied):
                 levels |= mask
             if levels != self.external[port]:
                 self.external[port] = levels

@@ -23,8 +23,15 @@ _SPEED = ("d", -1e6, 1e6)  # far more than a robot's
 _PLACE = ("d", -1e9, 1e9)
 
 
+BLOCKED_NM = 1e30
+"""Friction that nothing overcomes: a shaft with it stands within a step, and stays."""
+
+
 class Body:
-    """Shaft speeds (rad/s) and posture (m, m, rad; the heading is not wrapped) of one robot."""
+    """Shaft speeds (rad/s) and posture (m, m, rad; the heading is not wrapped) of one robot.
+
+    `left_brake_nm`, `right_brake_nm`: friction of a blocked shaft, a fault; 0 where it turns.
+    """
 
     STATE = {
         "left_rad_s": _SPEED,
@@ -32,7 +39,13 @@ class Body:
         "x_m": _PLACE,
         "y_m": _PLACE,
         "theta_rad": ("d", -0.5e6, 0.5e6),  # `dmath` takes a million
+        "left_brake_nm": ("d", 0.0, BLOCKED_NM),
+        "right_brake_nm": ("d", 0.0, BLOCKED_NM),
     }
+    NOT_HASHED: tuple[str, ...] = (
+        "left_brake_nm",
+        "right_brake_nm",
+    )  # a fault: what it does to the speed is hashed
     NOT_STATE: tuple[str, ...] = (
         "left_m_rad", "right_m_rad", "track_m", "friction_nm", "mass_ll", "mass_lr", "mass_rr", "inverse_ll",
         "inverse_lr", "inverse_rr", "turned_left_rad", "turned_right_rad",
@@ -54,6 +67,8 @@ class Body:
         self.inverse_ll = self.mass_rr / determinant
         self.inverse_lr = -self.mass_lr / determinant
         self.inverse_rr = self.mass_ll / determinant
+        self.left_brake_nm = 0.0
+        self.right_brake_nm = 0.0
         self.left_rad_s = 0.0
         self.right_rad_s = 0.0
         self.x_m = x_m
@@ -75,12 +90,12 @@ class Body:
         self.turned_right_rad[step] = 0.0
         if old_left != 0.0 or old_right != 0.0 or left_nms != 0.0 or right_nms != 0.0:
             half_s = 0.5 * TICK_S * ticks
-            most = 2.0 * half_s * self.friction_nm
+            step_s = 2.0 * half_s
             self._slide(
                 old_left + self.inverse_ll * left_nms + self.inverse_lr * right_nms,
                 old_right + self.inverse_lr * left_nms + self.inverse_rr * right_nms,
-                most,
-                most,
+                step_s * (self.friction_nm + self.left_brake_nm),
+                step_s * (self.friction_nm + self.right_brake_nm),
             )
             self.turned_left_rad[step] = half_s * (old_left + self.left_rad_s)
             self.turned_right_rad[step] = half_s * (old_right + self.right_rad_s)

@@ -16,12 +16,14 @@ cdef class Decay:
 @cython.final
 cdef class Winding:
     cdef public double current_a
-    cdef readonly int drive, wanted, wait_ticks, on_ticks, off_ticks
+    cdef readonly int drive, wanted, wait_ticks, on_ticks, off_ticks, is_open
+    cdef list volts
     cdef double volt[6], ohm[6], tau[6]
     cdef long long row[6]
     cdef readonly Decay decay
 
     cdef inline bint rests(self) noexcept
+    cpdef open(self, int is_open)
     cpdef inline void ask(self, int wanted) noexcept
     cdef inline long long pass_edge(self, Lm629 chip) noexcept
     cpdef double step(self, int ticks, double emf_v) except? -7.5

@@ -21,7 +21,7 @@ from functools import lru_cache
 from miro_exact import dmath
 from miro_exact.clock import NEVER_TICK
 from miro_exact.rng import Stream
-from miro_exact.state import TICK
+from miro_exact.state import FLAG, TICK
 from miro_robot.lm629.chip import Lm629
 from miro_robot.plant import Plant
 from miro_sim.plant.chassis import Body
@@ -76,8 +76,10 @@ class Winding:
         "drive": ("i", -1, 1),
         "wanted": ("i", -1, 1),
         "wait_ticks": ("i", 0, LONGEST_STEP),
+        "is_open": FLAG,
     }
-    NOT_STATE = ("on_ticks", "off_ticks", "decay", "volt", "ohm", "tau", "row")
+    NOT_STATE = ("on_ticks", "off_ticks", "decay", "volts", "volt", "ohm", "tau", "row")
+    NOT_HASHED = ("is_open",)  # a fault: what it does to the current is hashed
 
     def __init__(self, params: DriveParams) -> None:
         motor = params.motor
@@ -89,7 +91,9 @@ class Winding:
         diode_tau, transistor_tau = (motor.inductance_h / (ohm * TICK_S) for ohm in ohms)
         self.decay = _decay((diode_tau, transistor_tau))
         # Driving backward, off, driving forward; for each a current below zero, then one above it.
-        self.volt = [-driven, -diodes, diodes, -diodes, diodes, driven]
+        self.volts = [-driven, -diodes, diodes, -diodes, diodes, driven]
+        self.volt = [0.0] * 6
+        self.open(0)
         self.ohm = [through_transistors, *[through_diodes] * 4, through_transistors]
         self.tau = [transistor_tau, *[diode_tau] * 4, transistor_tau]
         self.row = [LONGEST_STEP + 1, 0, 0, 0, 0, LONGEST_STEP + 1]  # of `decay`
@@ -99,6 +103,17 @@ class Winding:
         self.drive = 0
         self.wanted = 0  # by the inputs
         self.wait_ticks = 0  # until the bridge does it; 0: it does
+
+    def open(self, is_open: int) -> None:
+        """Fault: the circuit is open from now on, and no current flows; 0: it is whole.
+
+        An open winding needs no branch in `_flow`: no back-EMF lies outside of these voltages.
+        """
+        self.is_open = is_open
+        for kind in range(6):
+            self.volt[kind] = self.volts[kind] if not is_open else -_LARGEST if kind & 1 else _LARGEST
+        if is_open:
+            self.current_a = 0.0
 
     def ask(self, wanted: int) -> None:
         """The inputs ask the transistors to drive forward (1), backward (-1) or not (0)."""
@@ -192,6 +207,9 @@ class Winding:
         longest = self.off_ticks if self.drive != 0 else self.on_ticks
         if (self.wait_ticks == 0) != (self.drive == self.wanted) or self.wait_ticks > longest:
             raise ValueError(f"a bridge at {self.drive} waits {self.wait_ticks} ticks for {self.wanted}")
+        if self.is_open and self.current_a != 0.0:
+            raise ValueError(f"{self.current_a} A flow in an open winding")
+        self.open(self.is_open)
 
     def __repr__(self) -> str:
         mode = "forward" if self.drive > 0 else "backward" if self.drive < 0 else "off"

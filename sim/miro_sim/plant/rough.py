@@ -183,6 +183,8 @@ class RoughBody(Body):
         rolls = old_v == rolling_v and old_w == rolling_w and old_u == 0.0
         most_left = step_s * self.friction_nm * (self.stiction_ratio if old_left == 0.0 else 1.0)
         most_right = step_s * self.friction_nm * (self.stiction_ratio if old_right == 0.0 else 1.0)
+        most_left += step_s * self.left_brake_nm
+        most_right += step_s * self.right_brake_nm
         if self.load_friction > 0.0:
             most_left += step_s * self.load_friction * abs(self.left_m_rad * self.left_load_n)
             most_right += step_s * self.load_friction * abs(self.right_m_rad * self.right_load_n)

@@ -6,8 +6,8 @@ from collections.abc import Callable
 from typing import Any
 
 from miro_exact.clock import CYCLE_TICKS
-from miro_protocol.actions import PutValue, fault_text
-from miro_robot.broken import flip_bit
+from miro_protocol.actions import OF_BOARDS, PutValue, fault_text
+from miro_robot.broken import break_processor
 from miro_robot.event_log import TRUE
 from miro_robot.image import Image
 from miro_robot.processor_board import ProcessorBoard
@@ -107,14 +107,14 @@ class Device:
 
     def check_fault(self, fault: str) -> None:
         """Raises ValueError for what is no fault, and for one that this board cannot have."""
-        if not fault_text(fault).startswith("flip "):
+        if fault_text(fault).split()[0] not in OF_BOARDS:
             raise ValueError(
                 f'{fault!r} is a fault of a robot; put a value of the part, as eyes.echo = "none"'
             )
 
     def break_hardware(self, fault: str) -> None:
-        """Does the fault, between two instructions: a bit of RAM turns over."""
-        flip_bit(self.board.cpu, fault.split()[1])
+        """Does the fault, between two instructions, or what of it is not the line's."""
+        break_processor(self.board, fault)
 
     # Pins
 

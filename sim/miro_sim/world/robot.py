@@ -27,6 +27,7 @@ from miro_robot.processor_board import ProcessorBoard
 from miro_robot.wiring import load_wiring
 from miro_sim.periods import Axis, Control, RobotPeriod
 from miro_sim.pitch.contact import GRID_TICKS
+from miro_sim.plant.chassis import BLOCKED_NM
 from miro_sim.scenario import keys as sc
 from miro_sim.scenario.build import pilot_and_drive
 from miro_sim.world.device import Device
@@ -92,14 +93,24 @@ class Robot(Device):
             encoder = self.drive.left_encoder if values[0] == "left" else self.drive.right_encoder
             level_a, level_b = ENCODERS[values[1]]
             encoder.hold(level_a, level_b)
+        elif word == "motor":
+            winding = self.drive.left_winding if values[0] == "left" else self.drive.right_winding
+            winding.open(int(values[1] == "open"))
+        elif word == "wheel":
+            brake_nm = BLOCKED_NM if values[1] == "blocked" else 0.0
+            setattr(self.drive.body, f"{values[0]}_brake_nm", brake_nm)
         # The network has broken the wire to RXD.
 
     def is_whole(self) -> bool:
-        """True if no encoder and no LM629 is broken now."""
+        """True if no part of it is broken now."""
+        drive, body = self.drive, self.drive.body
         broken = self.board.left.port.broken or self.board.right.port.broken
-        left, right = self.drive.left_encoder, self.drive.right_encoder
+        is_open = drive.left_winding.is_open or drive.right_winding.is_open
+        left, right = drive.left_encoder, drive.right_encoder
         held = left.held_a >= 0 or left.held_b >= 0 or right.held_a >= 0 or right.held_b >= 0
-        return not broken and not held
+        return not (
+            broken or self.board.is_stuck() or is_open or held or body.left_brake_nm or body.right_brake_nm
+        )
 
     def steer(self, measured: Posture | None, telemetry: LastTelemetry | None, tick: int) -> WheelCommand:
         """Wheel commands from what the PC measured and the robot's last telemetry. Raises PluginError."""

@@ -7,18 +7,20 @@ from typing import Any
 
 from miro_exact.clock import CHARACTER_BITS, CYCLE_TICKS
 from miro_exact.state import TICK
-from miro_protocol.actions import PutValue, ScriptItem
+from miro_protocol.actions import Action, Fault, PutValue, ScriptItem
 from miro_protocol.transmission import UP, Transmission, check_bad_stop, of_symbols
 from miro_robot.build import board_of
 from miro_robot.empty_board import EmptyBoard
 from miro_robot.image import Image
 from miro_robot.mcs51.cpu import STOPPED
 from miro_robot.mcs51.known_registers import lacking_lines, times
+from miro_robot.mcs51.line import Line
 from miro_robot.parts.netlist import Netlist
 from miro_robot.parts.values import checked_put, checked_read
 from miro_robot.parts.wire_part import WirePart
 from miro_robot.wired_board import WiredBoard
 from miro_sim.periods import PartValues
+from miro_sim.radio.params import RXD_STATES
 from miro_sim.scenario.board import FASTEST_BIT_TICKS, BoardScenario, check_board
 from miro_sim.world.actions import SETTLE_TICKS
 from miro_sim.world.changes import Changes, PinPlace, find_pin
@@ -29,6 +31,7 @@ from miro_sim.world.outbox import Outbox
 from miro_sim.world.terminal import Terminal, moves
 
 _STOP = CHARACTER_BITS - 1
+_INVERTED, _AT_1 = RXD_STATES.index("inverted"), RXD_STATES.index("1")
 
 
 class BoardAlone(Device):
@@ -91,6 +94,11 @@ class BoardAlone(Device):
         if path not in device.board.nets.netlist.free_pins():
             raise ValueError(f"{path}: something is wired to it; put a value of that, or choose another pin")
 
+    def check_fault(self, fault: str) -> None:
+        Device.check_fault(self, fault)
+        if fault.startswith("pin ") and not isinstance(self.board, WiredBoard):
+            raise ValueError(f"{fault}: no board file says what is wired to the pins")
+
     def put(self, path: str, value: PutValue, tick: int) -> None:
         device, path = self.at(path)
         part, key, taken = checked_put(device.parts, path, value)
@@ -149,10 +157,20 @@ class Wire(Medium):
     """Line `index` with one board on it. `script`: what the host sends; without it and a terminal, who injects.
 
     The PC hears a character when its stop bit begins. `output` gets each of them then, again where the world goes back.
+
+    `rxd_state`: a fault of the wire to RXD, of `RXD_STATES`, since `rxd_tick`; `whole`: what is on it meanwhile.
     """
 
-    STATE = {"terminal": Terminal, "bit_ticks": ("q", 0, 1 << 40), "busy_tick": TICK, "transmissions": TICK}
-    NOT_HASHED = ("bit_ticks",)
+    STATE = {
+        "terminal": Terminal,
+        "bit_ticks": ("q", 0, 1 << 40),
+        "busy_tick": TICK,
+        "transmissions": TICK,
+        "rxd_state": ("i", 0, len(RXD_STATES) - 1),
+        "rxd_tick": TICK,
+        "whole": Line,
+    }
+    NOT_HASHED = ("bit_ticks", "rxd_state", "rxd_tick", "whole")  # what comes through the wire is hashed
     NOT_STATE: tuple[str, ...] = ("character_ticks", "output", "between")
 
     def __init__(
@@ -172,6 +190,8 @@ class Wire(Medium):
         self.bit_ticks = scenario.host_bit_ticks  # 0: not known yet
         self.busy_tick = 0
         self.transmissions = 0
+        self.rxd_state = self.rxd_tick = 0
+        self.whole = Line()
         self.character_ticks = 0  # of the last one that the board sent
         self.output: Callable[[bytes], object] | None = None
         parts = board.parts if isinstance(board, WiredBoard) else []
@@ -252,7 +272,30 @@ class Wire(Medium):
 
     def _give(self, tick: int, level: int) -> None:
         """The host's level from `tick` on."""
+        if self.rxd_state:
+            self.whole.append(tick, level)
+            level = level ^ 1 if self.rxd_state == _INVERTED else int(self.rxd_state == _AT_1)
         self.board.cpu.rxd.append(tick, level)
+
+    def check_action(self, action: Action) -> None:
+        Medium.check_action(self, action)
+        if isinstance(action, Fault) and action.what.startswith("rxd "):
+            self._check_rxd_is_free()
+            if self.terminal is not None or len(self.devices) > 1:
+                raise ValueError(
+                    f"net{self.index}: {action.what}: only the wire from a PC to one board can break"
+                )
+
+    def set_rxd(self, slot: int, state: int) -> None:
+        rxd = self.board.cpu.rxd
+        tick = rxd.settled_tick
+        real = self.whole if self.rxd_state else rxd
+        levels = [(tick, real.level_at(tick)), *(edge for edge in real.edges() if edge[0] > tick)]
+        rxd.ticks = [edge for edge in rxd.ticks if edge < tick]
+        self.whole.ticks = []
+        self.rxd_state, self.rxd_tick = state, tick
+        for tick, level in levels:
+            self._give(tick, level)
 
     def reseed(self, seed: int, tick: int, up: bool) -> None:
         for device in self.devices if up else ():
@@ -322,7 +365,7 @@ class Wire(Medium):
         settled_tick = rxd.settled_tick
         if self.terminal is None and settled_tick != tick + SETTLE_TICKS and tick:
             raise ValueError(f"RXD is settled up to tick {settled_tick}, at tick {tick}")
-        if self.terminal is None and rxd.last_tick() > self.busy_tick:
+        if self.terminal is None and rxd.last_tick() > max(self.busy_tick, self.rxd_tick):
             raise ValueError(f"RXD changes at tick {rxd.last_tick()}, after all that was sent")
 
     def after_load(self) -> None:

@@ -5,7 +5,7 @@ import random
 import pytest
 
 from miro_protocol import stream
-from miro_protocol.actions import Fault, fault_text
+from miro_protocol.actions import FAULTS, Fault, fault_text
 from mirotwin.fuzz.spec import TargetSpec
 from mirotwin.fuzz.target import FAULT_WAYS, OF_BROKEN, fault_of, robot_target
 from mirotwin.runs.run import Run, robot_spec
@@ -47,4 +47,5 @@ def test_what_is_found_is_found_again_and_a_world_confirms_firmware_faults():
             confirmed += any(one.check == "no_fault" for one in Run(spec).play().failures)
         assert failure is None or failure.check in (*OF_BROKEN, "never_sleeps")
     assert found
+    assert {word.split()[0] for word in FAULT_WAYS} == FAULTS.keys() - {"encoder", "rxd"}
     assert confirmed >= found // 2, (found, confirmed)

@@ -27,7 +27,11 @@ def result(steps, **changes):
 
 
 @pytest.mark.parametrize(
-    "what", ["encoder left lost", "lm629 right busy", "rxd 0", "power dip", "flip FFh.0", "encoder left ok"]
+    "what",
+    [
+        *("encoder left lost", "lm629 right busy", "rxd 0", "power dip", "flip FFh.0", "encoder left ok"),
+        *("motor left open", "wheel right blocked", "pin P0.0 0", "pin P3.3 0"),
+    ],
 )
 def test_a_fault_that_changes_something_leaves_the_verdict_to_the_checks(what):
     found = result(f'{DRIVES}, {{ fault = "{what}" }}, {GOES_ON}')
@@ -35,7 +39,15 @@ def test_a_fault_that_changes_something_leaves_the_verdict_to_the_checks(what):
 
 
 @pytest.mark.parametrize(
-    ("before", "what"), [(DRIVES + ", " + QUIET, "rxd 1"), ("{ pause_ms = 100 }", "encoder right a1")]
+    ("before", "what"),
+    [
+        (DRIVES + ", " + QUIET, "rxd 1"),
+        ("{ pause_ms = 100 }", "encoder right a1"),
+        ("{ pause_ms = 100 }", "motor left open"),
+        ("{ pause_ms = 100 }", "wheel left blocked"),
+        (DRIVES + ", " + QUIET, "pin P1.0 0"),  # the slot, which is read once
+        (DRIVES + ", " + QUIET, "pin P1.7 0"),  # which is wired to nothing
+    ],
 )
 def test_one_that_changes_nothing_is_not_judged_among_all_that_goes_in(before, what):
     found = result(
@@ -79,6 +91,12 @@ def test_a_fault_that_comes_after_the_end_is_not_judged():
     assert proof.missing(spec.world) == "it: the run ended before the fault"
 
 
-@pytest.mark.parametrize("what", ["encoder left lost", "lm629 left busy", "rxd 0"])
+@pytest.mark.parametrize(
+    "what",
+    [
+        *("encoder left lost", "lm629 left busy", "rxd 0"),
+        *("motor right open", "wheel left blocked", "pin P2.0 0", "pin P2.4 1"),
+    ],
+)
 def test_a_robot_that_is_broken_need_not_act(what):
     assert result(f'{DRIVES}, {{ fault = "{what}" }}, {{ pause_ms = 400 }}').failures == []

@@ -146,3 +146,30 @@ def test_pins_that_nothing_samples_are_as_if_they_were_sampled_after_each_write(
             cpu.run(cycles)
         states.append(snapshot(cpu))
     assert states[0] == states[1]
+
+
+@pytest.mark.parametrize("latch", [0x00, 0xFF])
+@pytest.mark.parametrize("outside", [0x00, 0xFF])
+def test_a_shorted_pin_is_read_as_the_rail_whatever_drives_it(latch, outside):
+    cpu = cpu_with(f"MOV P1,#{latch}\nMOV A,P1\nINC P1\nMOV R2,P1\nMOV A,P1")
+    cpu.set_external(1, outside, 0)
+    cpu.step()
+    cpu.hold_pins(1, 0x20, 0x08, outside)
+    cpu.step()
+    assert cpu.a == (latch & outside | 0x08) & ~0x20
+    cpu.step()
+    assert sfr(cpu, "P1") == (latch + 1) & 0xFF  # of the latch, as before
+    cpu.step()
+    cpu.hold_pins(1, 0, 0, outside)
+    cpu.step()
+    assert cpu.a == (latch + 1) & outside & 0xFF
+
+
+def test_a_shorted_pin_is_an_edge_for_timers_and_interrupts():
+    cpu = cpu_with("MOV TMOD,#05h\nMOV TCON,#11h\nNOP\nNOP\nNOP\nNOP\nMOV A,TCON\nMOV R2,TL0")
+    for _ in range(3):
+        cpu.step()
+    cpu.hold_pins(3, 0x14, 0, 0xFF)  # INT0, T0
+    for _ in range(5):
+        cpu.step()
+    assert (cpu.a & 0x02, cpu.peek_iram(2)) == (0x02, 1)

@@ -467,3 +467,29 @@ def test_nets_start_from_a_saved_state_with_the_same_levels():
 
 def test_nets_have_no_state():
     assert Nets.NOT_STATE == ("*",)
+
+
+# A port pin that is shorted
+
+
+@pytest.mark.parametrize("level", [0, 1])
+@pytest.mark.parametrize("port", [0, 1])
+@pytest.mark.parametrize("drive", [LOW, HIGH, RELEASED])
+def test_a_short_wins_over_all_drivers_and_is_no_contention(drive, port, level):
+    board = one_net(scripted("x", [(5, Q, drive)]), scripted("y"), pins=(Q, A), pull_downs=["n"])
+    board.sync(5)
+    board.port_written(P1, 0xFB | port << 2, 12)
+    before, seen = dict(levels(board)), board.nets.external[P1]
+    board.faults.clear()
+    board.hold_pin(1, 2, level)
+    assert levels(board) == {"n": level}
+    assert board.parts[1].level(A) == level
+    other = one_net(scripted("x", [(5, Q, drive)]), scripted("y"), pins=(Q, A), pull_downs=["n"])
+    restore(other, snapshot(board))
+    assert levels(other) == levels(board)
+    board.port_written(P1, 0xFB | (1 - port) << 2, 24)
+    board.port_written(P1, 0xFB | port << 2, 36)
+    assert levels(board) == {"n": level}
+    assert board.faults == []
+    board.hold_pin(1, 2, -1)
+    assert (levels(board), board.nets.external[P1]) == (before, seen)

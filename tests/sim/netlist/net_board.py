@@ -18,6 +18,7 @@ from miro_robot.wired_board import WiredBoard
 from miro_sim.scenario.board_file import load_board
 
 _SIDES = ("left", "right")
+_AT_CHIPS = (0xFF, 0, 0x3F, 0)  # by port, the pins that inputs of the LM629 are wired to
 _SAMPLED = 9  # S5P2: the tick of a cycle at which pins are sampled
 
 
@@ -74,8 +75,11 @@ class NetBoard(WiredBoard):
 
     @property
     def bank(self):
-        """Ports, latches of MOVX (MIRO has none), a constant."""
-        return bytes(self.nets.latches) + b"\xff" * 9
+        """Ports, of the LM629's pins those that are shorted, too; latches of MOVX (MIRO has none), a constant."""
+        ports = zip(
+            self.nets.latches, _AT_CHIPS, map(self.cpu.peripherals.ports.driven, range(4)), strict=True
+        )
+        return bytes(latch & ~mask | driven & mask for latch, mask, driven in ports) + b"\xff" * 9
 
     @property
     def external(self):
@@ -119,7 +123,7 @@ def _entries():
         if isinstance(kind, type):
             yield state.Below(name, False, True)
         else:
-            yield state.Group([(name, state.kind_of(kind))], True)
+            yield state.Group([(name, state.kind_of(kind))], name not in Board.NOT_HASHED)
 
 
 state._ENTRIES[NetBoard] = list(_entries())

@@ -176,3 +176,25 @@ def test_a_bridge_saved_while_it_waits_switches_on_the_same_tick(first, then, ti
 def test_an_interval_the_tables_do_not_cover_is_refused(ticks):
     with pytest.raises(ValueError, match=r"1\.\.2048"):
         winding(1, 0.0).step(ticks, 0.0)
+
+
+@given(DRIVES, CURRENTS, EMFS, TICKS)
+def test_no_current_flows_in_an_open_winding_until_it_is_mended(drive, current, emf, ticks):
+    one, other = winding(drive, current), winding(drive, 0.0)
+    one.open(1)
+    assert (one.step(ticks, emf), one.current_a) == (0.0, 0.0)
+    restore(other, snapshot(one))
+    assert (other.step(ticks, emf), other.current_a) == (0.0, 0.0)
+    other.open(0)
+    whole = winding(drive, 0.0)
+    whole.step(ticks, emf)
+    whole.current_a = 0.0
+    assert other.step(ticks, emf) == whole.step(ticks, emf)
+
+
+def test_a_saved_open_winding_with_a_current_is_refused():
+    one, other = winding(1, 0.5), winding(1, 0.0)
+    saved = snapshot(one)
+    other.open(1)
+    with pytest.raises(ValueError, match=r"0\.5 A flow in an open winding"):
+        restore(one, saved[:8] + snapshot(other)[8:])

@@ -7,7 +7,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from miro_exact.rng import Stream
-from miro_sim.plant.chassis import Body
+from miro_sim.plant.chassis import BLOCKED_NM, Body
 from miro_sim.plant.drive import DifferentialDrive
 from miro_sim.plant.params import Chassis, Disturbance, DriveParams, Motor, OpticalEncoder, RollingBall, Tyre
 from miro_sim.plant.rough import DisturbingForce, RoughBody
@@ -470,3 +470,29 @@ def test_a_force_below_the_friction_of_the_drive_moves_nothing():
     drive = DifferentialDrive(DriveParams(disturbance=Disturbance(force_n=0.2, torque_nm=0.006)))
     drive.advance(SECOND)
     assert drive.pose_at(drive.tick)[0] > 0.0
+
+
+# A blocked wheel
+
+
+@pytest.mark.parametrize("kind", ["rolls", *KINDS])
+@given(SPEEDS, SPEEDS, IMPULSES, IMPULSES, TICKS)
+def test_a_blocked_shaft_stands_and_only_takes_energy(kind, left, right, push_left, push_right, ticks):
+    params = KINDS.get(kind, DriveParams())
+    one = (Body if kind == "rolls" else RoughBody)(params, 0.0, 0.0, 0.0)
+    one.left_rad_s, one.right_rad_s = left, right
+    if kind != "rolls":
+        one.v_m_s, one.w_rad_s = one.velocity()
+    one.left_brake_nm = BLOCKED_NM
+    for number in range(20):
+        before = kinetic_energy_j(one)
+        pushed = number % 2
+        one.push(pushed * push_left, pushed * push_right, ticks)
+        assert one.left_rad_s == 0.0
+        assert pushed or kinetic_energy_j(one) <= before * (1.0 + 1e-15)
+    if kind == "rolls":
+        # What the other one gains is what a robot has that turns about the blocked wheel.
+        speed = one.right_rad_s
+        one.push(0.0, 1e-5, 24)
+        most = one.friction_nm * 24 / 24e6
+        assert one.right_rad_s - speed == pytest.approx(1e-5 / one.mass_rr, abs=2.0 * most / one.mass_rr)

@@ -19,6 +19,12 @@ PAIRS = [
     ("rxd 1", "rxd ok"),
     ("power dip", "power dip"),
     ("flip 2Ah.3", "flip 2Ah.3"),
+    ("motor left open", "motor left ok"),
+    ("wheel right blocked", "wheel right ok"),
+    ("pin P0.3 1", "pin P0.3 ok"),
+    ("pin P0.6 0", "pin P0.6 1"),
+    ("pin P2.3 0", "pin P2.3 ok"),
+    ("pin P3.2 0", "pin P3.2 ok"),
 ]
 
 
@@ -98,7 +104,17 @@ def test_a_fault_is_an_action_of_its_period_and_an_event_of_its_robot():
 
 
 @pytest.mark.parametrize(
-    "what", ["encoder left", "encoder middle lost", "flip 2A.3", "flip 100h.3", "flip 2Ah.8", ""]
+    "what",
+    [
+        "encoder left",
+        "encoder middle lost",
+        "flip 2A.3",
+        "flip 100h.3",
+        "flip 2Ah.8",
+        "",
+        "pin P3.0 0",
+        "pin P1.8 1",
+    ],
 )
 def test_what_is_no_fault_is_refused(what):
     world: World = driven(2279)
@@ -114,7 +130,7 @@ def test_a_board_has_flips_and_else_values_that_are_put():
     world.run_for(200)
     assert world.device().board.cpu.peek_iram(0x30) == 0x80
     with pytest.raises(ValueError, match="is a fault of a robot; put a value of the part"):
-        world.do(Fault(world.earliest_action_tick, 0, 0, "rxd 0"))
+        world.do(Fault(world.earliest_action_tick, 0, 0, "encoder left lost"))
 
 
 def test_a_fault_has_one_spelling():
