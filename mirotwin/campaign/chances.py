@@ -13,15 +13,17 @@ import math
 
 from miro_exact import dmath
 
+DEVIATIONS = 1.96
+"""Of a normal distribution, to either side: 95 %."""
 UNLIKELY = 0.05
 """The chance of what is taken for impossible."""
 
 
-def wilson(count: int, trials: int, deviations: float = 1.96) -> tuple[float, float]:
-    """The interval of a share of which `count` of `trials` are a sample; 95 % unless told."""
-    share, spread = count / trials, deviations * deviations / trials
+def wilson(count: int, trials: int) -> tuple[float, float]:
+    """The 95 % interval of a share of which `count` of `trials` are a sample."""
+    share, spread = count / trials, DEVIATIONS * DEVIATIONS / trials
     middle = share + spread / 2
-    half = deviations * math.sqrt(share * (1 - share) / trials + spread / (4 * trials))
+    half = DEVIATIONS * math.sqrt(share * (1 - share) / trials + spread / (4 * trials))
     return (middle - half) / (1 + spread), (middle + half) / (1 + spread)
 
 

@@ -6,7 +6,7 @@ some fifty times slower, so it sees only inputs that found something new.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
+from collections.abc import Callable
 
 from miro_robot.image import Image
 from miro_robot.inspect.counters import Counters
@@ -52,10 +52,6 @@ class InputCoverage:
             self.target.run(data)
         finally:
             detach(self.target.cpu, watcher)
-
-    def functions_of(self, counts: Mapping[int, object]) -> frozenset[str]:
-        """Names of the functions in which something ran."""
-        return frozenset(self.names.function(address)[1] for address in counts)
 
     def function(self, address: int) -> str:
         """The name of the function that an instruction belongs to."""

@@ -41,8 +41,6 @@ if TYPE_CHECKING:
     from miro_sim.world.world import World  # a hot module: not before the engine was chosen
 
 _OF_A_RECORDING = ("kind", "within_ms", "within_counts", "within_counts_per_sample", "from_time")
-_OF_THE_WORLD = (*_OF_A_RECORDING, "seed", "settings", "expected")
-AT_PORT = DeskOptions.HEADING
 
 
 class ReplayOptions(CaseOptions, frozen=True, kw_only=True):

@@ -32,10 +32,10 @@ def heading(theta_rad: float) -> Quaternion:
 
 
 @cache
-def paint(name: str, alpha: float = 1.0) -> Color:
+def paint(name: str) -> Color:
     """How a paint of the scene looks on a screen."""
     red, green, blue = (exp(SCREEN_GAMMA * log(part / 1000.0)) for part in PAINTS[name])
-    return Color(red, green, blue, alpha)
+    return Color(red, green, blue, 1.0)
 
 
 def box(low: tuple[float, float, float], high: tuple[float, float, float], color: Color) -> SolidPrimitive:
