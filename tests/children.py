@@ -44,6 +44,16 @@ def uncompiled(code):
     return run(command, capture_output=True, text=True, check=True, cwd=ROOT).stdout
 
 
+def same_uncompiled(call):
+    """Whether the text that this function of a module gives is the same uncompiled; true where nothing is compiled."""
+    from miro_exact import engine  # builders of packages, which start children too, need not have it
+
+    if engine.active() == "python":
+        return True
+    code = f"from {call.__module__} import {call.__name__}; print({call.__name__}())"
+    return uncompiled(code).strip() == call()
+
+
 def pool(count=None):
     """`ProcessPoolExecutor`, with default signals."""
     return ProcessPoolExecutor(count, initializer=reset_signals)

@@ -6,7 +6,6 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from miro_exact import engine
 from miro_exact.state import Flat
 from miro_robot.board_spec import BoardSpec
 from miro_robot.empty_board import EmptyBoard
@@ -277,8 +276,7 @@ def runs():
 
 
 def test_both_engines_do_the_same():
-    if engine.active() == "compiled":
-        assert children.uncompiled(f"from {__name__} import runs; print(runs())").strip() == runs()
+    assert children.same_uncompiled(runs)
 
 
 def test_a_program_of_an_assembler_is_the_same_as_steps():

@@ -4,7 +4,6 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from miro_exact import engine
 from miro_exact.clock import ms
 from miro_protocol.actions import Put
 from miro_robot.parts.nets import Observer
@@ -186,8 +185,7 @@ def waited():
 
 
 def test_both_engines_wait_alike():
-    code = f"from {__name__} import waited; print(waited())"
-    assert engine.active() == "python" or children.uncompiled(code).strip() == waited()
+    assert children.same_uncompiled(waited)
 
 
 def test_loading_a_world_forgets_what_was_watched_before():

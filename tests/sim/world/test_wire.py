@@ -1,7 +1,5 @@
 """A board alone on a wire of the world: input, waits, its end, and its state."""
 
-import sys
-
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
@@ -273,27 +271,17 @@ def test_input_that_waits_is_saved_and_no_part_of_the_digest():
     assert bits(worlds[0]) != bits(worlds[1])
 
 
-SOURCE = """
-from miro_exact import engine
-engine.select({engine!r})
-from tests.sim.world.test_wire import ECHO, board_world, typed
-world = board_world(ECHO, terminal=typed(b"ab", wait=True))
-world.run_to(300_000)
-print(world.save().hex())
-world.run_to(2_500_000)
-print(world.digest)
-"""
+def saved_and_digest():
+    """A saved world and the digest at its end."""
+    world = board_world(ECHO, terminal=typed(b"ab", wait=True))
+    world.run_to(300_000)
+    saved = world.save().hex()
+    world.run_to(2_500_000)
+    return f"{saved} {world.digest}"
 
 
 def test_both_engines_give_the_same_bits():
-    compiled, python = (
-        children.run(
-            [sys.executable, "-c", SOURCE.format(engine=engine)], capture_output=True, text=True
-        ).stdout
-        for engine in ("compiled", "python")
-    )
-    assert compiled
-    assert compiled == python
+    assert children.same_uncompiled(saved_and_digest)
 
 
 def test_speeds_of_wheels_are_refused_where_there_are_none():

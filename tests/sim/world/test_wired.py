@@ -1,6 +1,5 @@
 """A board with parts on a wire of the world: what a test puts and reads, its records, and its state."""
 
-import sys
 from typing import Annotated, Literal
 
 import pytest
@@ -315,27 +314,17 @@ def test_a_saved_put_that_no_part_takes_is_refused():
     assert other.state.save() == wired_world().state.save()
 
 
-SOURCE = """
-from miro_exact import engine
-engine.select({engine!r})
-from tests.sim.world.test_wired import SCRIPT, wired_world
-world = wired_world(SCRIPT)
-world.run_to(1_950_000)
-print(world.save().hex())
-world.step()
-print(world.digest)
-"""
+def saved_and_digest():
+    """A saved world and the digest a period later."""
+    world = wired_world(SCRIPT)
+    world.run_to(1_950_000)
+    saved = world.save().hex()
+    world.step()
+    return f"{saved} {world.digest}"
 
 
 def test_both_engines_give_the_same_bits():
-    compiled, python = (
-        children.run(
-            [sys.executable, "-c", SOURCE.format(engine=engine)], capture_output=True, text=True
-        ).stdout
-        for engine in ("compiled", "python")
-    )
-    assert compiled
-    assert compiled == python
+    assert children.same_uncompiled(saved_and_digest)
 
 
 # --------------------------------------------------------------------------------------------- RXD
