@@ -1,4 +1,4 @@
-"""Writes the tables of protocol/README.md from the table: `python -m docs.site.protocol_tables`."""
+"""Writes the tables of protocol/README.md, as columns of text: `python -m docs.site.protocol_tables`."""
 
 from __future__ import annotations
 
@@ -13,14 +13,19 @@ from miro_protocol.table import DOWNLINK, TELEMETRY, Field, Format, FrameType, O
 def render() -> str:
     """Frames, messages, flags and times, ending in a newline."""
     parts = (_frames(), _types(), _fields(), _flags(), _times())
-    return "\n".join("\n".join(part) + "\n" for part in parts)
+    return "\n".join("\n".join(("```text", *part, "```")) + "\n" for part in parts)
 
 
 def _rows(heads: Sequence[str], rows: Iterable[Sequence[object]]) -> Iterator[str]:
-    yield "| " + " | ".join(heads) + " |"
-    yield "|" + "---|" * len(heads)
-    for row in rows:
-        yield "| " + " | ".join(str(cell) for cell in row) + " |"
+    return _columns([heads, *rows])
+
+
+def _columns(rows: Iterable[Sequence[object]]) -> Iterator[str]:
+    """Text in columns, two blanks apart."""
+    lines = [tuple(str(cell) for cell in row) for row in rows]
+    widths = [max(len(cell) for cell in column) for column in zip(*lines, strict=True)]
+    for line in lines:
+        yield "  ".join(cell.ljust(width) for cell, width in zip(line, widths, strict=True)).rstrip()
 
 
 def _frames() -> Iterator[str]:
@@ -39,17 +44,25 @@ def _types() -> Iterator[str]:
 
 
 def _fields() -> Iterator[str]:
-    rows: list[Sequence[object]] = []
-    rows += _offsets("0, 3, each robot", table.VELOCITY, 0)
-    rows += _offsets("1", table.SERVICE, 0)
+    """A title for each message, then its fields: offset, names, range, meaning."""
     start = sum(field.size for field in table.SERVICE)
-    for opcode in Opcode:
-        rows += _offsets(f"1, opcode {opcode:d} {opcode.name.lower()}", table.SERVICE_DATA[opcode], start)
-    rows += _offsets("2", table.TELEMETRY_FIELDS, 0)
-    return _rows(("in type", "offset", "field", "range", "meaning"), rows)
+    messages = [
+        ("type 0, 3: each robot", table.VELOCITY, 0),
+        ("type 1", table.SERVICE, 0),
+        *(
+            (f"type 1, opcode {code:d} {code.name.lower()}", table.SERVICE_DATA[code], start)
+            for code in Opcode
+            if table.SERVICE_DATA[code]
+        ),
+        ("type 2", table.TELEMETRY_FIELDS, 0),
+    ]
+    yield "payload from byte .. on, field, range, meaning"
+    for title, fields, offset in messages:
+        yield title
+        yield from (f"  {row}" for row in _columns(_offsets(fields, offset)))
 
 
-def _offsets(where: str, fields: Iterable[Field], start: int) -> Iterator[Sequence[object]]:
+def _offsets(fields: Iterable[Field], start: int) -> Iterator[Sequence[object]]:
     """A row for each run of neighbouring fields that have range and meaning in common."""
     placed = []
     for field in fields:
@@ -57,7 +70,7 @@ def _offsets(where: str, fields: Iterable[Field], start: int) -> Iterator[Sequen
         start += field.size
     for (limits, meaning), run in groupby(placed, key=lambda pair: _about(pair[1])):
         offsets, names = zip(*((str(offset), field.name) for offset, field in run), strict=True)
-        yield where, ", ".join(offsets), ", ".join(names), limits, meaning
+        yield ",".join(offsets), ", ".join(names), limits, meaning
 
 
 def _about(field: Field) -> tuple[str, str]:
