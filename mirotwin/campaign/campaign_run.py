@@ -98,9 +98,8 @@ def run(options: CampaignOptions) -> int:
     """
     require_arrow()
     options.plugins.bring()
-    settings = (*options.plugins.settings(options.settings), *options.settings)
-    plan = load(options.file, (*settings, *as_settings(options.expected, files=False)))
-    plan = replace(plan, plugins=options.plugins)
+    settings = (*options.settings, *as_settings(options.expected, files=False))
+    plan = load(options.file, settings, options.plugins)
     if options.flips is not None:
         plan = flipped(plan, options.flips)
     tell_notes(plan.notes)

@@ -19,6 +19,7 @@ from miro_sim.scenario.settings import EXPECT, in_text
 from mirotwin.campaign.design import Design, Draw, Factor, Level, Value, as_kind, inline, kind_of
 from mirotwin.campaign.plan import OWN_IMAGE, Plan, checked
 from mirotwin.campaign.ranges import draw_of, is_range, seeds_of
+from mirotwin.shell.plugin_files import PluginFiles
 
 BUILTIN = Path(__file__).parent / "builtin"
 MOST_RUNS = 1_000_000_000
@@ -60,22 +61,32 @@ def builtin_names() -> list[str]:
     return sorted(path.stem for path in BUILTIN.glob("*.toml"))
 
 
-def load(path: str | Path, settings: Sequence[str] = ()) -> Plan:
+def load(path: str | Path, settings: Sequence[str] = (), plugins: PluginFiles | None = None) -> Plan:
     """The campaign of a file, or the built-in one of that name, with more `settings` (KEY=VALUE) for all runs.
 
+    `plugins`: brought by the command line; one alone is that of all robots, unless a setting or a level names it.
     Raises BadInput with the place of what is wrong.
     """
     path = Path(path)
     if not path.exists() and str(path) in builtin_names():
         own = BUILTIN / f"{path}.toml"
         plan = _parsed(own.read_text(encoding="utf-8"), own)
-        return checked(msgspec.structs.replace(plan, path=str(path)), settings)
+        return _checked(msgspec.structs.replace(plan, path=str(path)), settings, plugins)
     try:
         text = decode(read_input(path, TEXT_KIB << 10), str(path))
     except FileNotFoundError:
         remedy = f"`mirotwin examples campaign` writes one; built-in: {', '.join(builtin_names())}"
         raise BadInput(path, "", "there is no such file", remedy) from None
-    return parse(text, path, settings)
+    return _checked(_parsed(text, path), settings, plugins)
+
+
+def _checked(plan: Plan, settings: Sequence[str], plugins: PluginFiles | None) -> Plan:
+    """Raises BadInput."""
+    if plugins is None:
+        return checked(plan, settings)
+    named = [text for factor in plan.design.factors for level in factor.levels for text in level.settings]
+    for_all = plugins.settings([*settings, *named])
+    return msgspec.structs.replace(checked(plan, (*for_all, *settings)), plugins=plugins)
 
 
 def parse(text: str, path: str | Path, settings: Sequence[str] = ()) -> Plan:

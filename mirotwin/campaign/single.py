@@ -13,6 +13,7 @@ from time import perf_counter
 import msgspec
 from msgspec.structs import replace
 
+from miro_exact import installed
 from miro_exact.bad_input import BadInput
 from miro_robot.image import SPACE_BYTES, Image, parse_hex
 from miro_sim.periods import Period, RobotId
@@ -34,12 +35,17 @@ from mirotwin.verify.checks.interface import Check, Expectation
 from mirotwin.verify.steps.keys import Step, WaitStep
 from mirotwin.verify.steps.reading import steps_of
 
+Prepared = tuple[AnyText, dict[RobotId, list[Check]], list[Step]]
+
+
+def prepared(origin: str, text: str, settings: tuple[str, ...]) -> Prepared:
+    """A scenario with its settings made, what it expects, and its steps. Raises BadInput for one that cannot be run."""
+    return _prepared(origin, text, settings, tuple(installed.in_files.items()))
+
 
 @lru_cache(maxsize=64)
-def prepared(
-    origin: str, text: str, settings: tuple[str, ...]
-) -> tuple[AnyText, dict[RobotId, list[Check]], list[Step]]:
-    """A scenario with its settings made, what it expects, and its steps. Raises BadInput for one that cannot be run."""
+def _prepared(origin: str, text: str, settings: tuple[str, ...], _brought: object) -> Prepared:
+    """`_brought`: plug-ins in files; with others the same text is another scenario."""
     spec = any_of_text(text, origin, settings)
     return spec, expectations_of(spec.scenario, origin), steps_of(spec.scenario, origin)
 

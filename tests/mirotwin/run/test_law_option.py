@@ -70,6 +70,20 @@ def test_it_steers_only_those_robots_for_which_the_scenario_or_a_setting_names_i
     assert laws_in(here / "file") == ["samson", None]
 
 
+def test_it_steers_only_those_runs_of_a_campaign_whose_level_names_it(mirotwin, here):
+    parquet = pytest.importorskip("pyarrow.parquet", reason="needs pyarrow: the extra campaign")
+    alone = 'scenario = "short.toml"\nset = { duration_s = 0.2 }\n'
+    levels = '[factor.law]\nown = []\nmine = ["law=samson"]\n'
+    digests = {}
+    for name, text, options in (("both", alone + levels, ("--law", LAW)), ("alone", alone, ())):
+        (here / f"{name}.toml").write_text(text)
+        assert mirotwin("campaign", f"{name}.toml", "-q", *options, "--out", f"{name}.parquet")[0] == 0
+        digests[name] = parquet.read_table(f"{name}.parquet")["digest"].to_pylist()
+    own, mine = digests["both"]
+    assert [own] == digests["alone"]
+    assert mine != own
+
+
 def test_of_two_laws_the_scenario_says_which_steers_which(mirotwin, here):
     both = ("--law", LAW, "--law", OTHER)
     _, _, err = mirotwin("run", "short.toml", *OPTIONS, *both, "--out", "neither")

@@ -21,10 +21,10 @@ CHECK_PAGE, STEP_PAGE, RULE_PAGE = (
 CHECK_ROWS = {
     name: (kind, parameters, fails)
     for name, kind, parameters, fails in re.findall(
-        r"^\| `(\w+)` \| (\w+) \|(.*?)\| (.*) \|$", CHECK_PAGE, re.M
+        r"^\* `(\w+)` \((safety|liveness)(.*?)\): (.*(?:\n  .*)*)$", CHECK_PAGE, re.M
     )
 }
-STEP_ROWS = re.findall(r"^\| (`.*?) \| (.*) \|$", STEP_PAGE, re.M)
+STEP_ROWS = re.findall(r"^\* (`.*?): (.*(?:\n  .*)*)$", STEP_PAGE, re.M)
 EVERYWHERE = {"network", "slot", "note", "number"}
 
 
