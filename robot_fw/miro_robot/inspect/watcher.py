@@ -77,8 +77,10 @@ class Inspector:
         began = cpu.cycles
         reason = 0
         if began >= until_cycle:
+            # No run for the watchers, but the lines are settled as without them.
             return cpu.run_alone(until_cycle)
         for watcher in self.watchers:
+            # Before the run: `end_run` forgets the edges on RXD that they read.
             watcher.starting(cpu)
         cpu.begin_run()
         while reason == 0 and cpu.cycles < until_cycle:
@@ -98,6 +100,7 @@ class Inspector:
         start = cpu.cycles
         executed = cpu.instructions
         reason = cpu.execute(start + 1)
+        # The step may be an interrupt's LCALL, which is no instruction, or none at all, at a mark.
         if cpu.instructions != executed:
             for watcher in self.watchers:
                 watcher.executed(cpu, pc, start)
@@ -112,11 +115,13 @@ class Inspector:
         start = cpu.cycles
         ended = 0
         cpu.until = until_cycle
+        # As `execute` does: while the reason of the last run stands, `boundary` ends at once.
         cpu.stop = 0
         cpu.limit = 0
         while ended == 0 and (cpu.idle or cpu.powered_down):
             ended = cpu.boundary()
         woken = cpu.idle == 0 and cpu.powered_down == 0
+        # The LCALL that wakes it has been done in the same boundary.
         end = cpu.cycles - (_CALL_CYCLES if woken else 0)
         if end > start:
             for watcher in self.watchers:
@@ -148,6 +153,7 @@ def detach(cpu: Cpu, *watchers: Watcher) -> None:
     inspector = cpu.inspector
     if isinstance(inspector, Inspector):
         inspector.watchers = [watcher for watcher in inspector.watchers if watcher not in watchers]
+        # Paused ones come back: without the inspector `resume` would tell a CPU that runs its hot loop.
         if not inspector.watchers and not inspector.held:
             cpu.inspector = None
         for watcher in watchers:

@@ -168,6 +168,7 @@ class Lm629:
             self.threshold = 0x7FFF
             self.encoder.settle(tick)
             self._enter_reset(_HELD, _HARDWARE_RESET, NEVER_TICK)
+        # A shorter pulse is below the sheet's minimum: chosen, the chip stands still until a long one.
         elif tick - self.reset_tick >= self.options.reset_pulse_clocks * LM629_CLOCK_TICKS:
             self.mode = _RESETTING
             # Reset clocks are counted from the next edge of the chip's own clock, every fourth tick.
@@ -471,6 +472,7 @@ class Lm629:
         self.writes_while_busy = self.port.writes_while_busy
         if outcome:
             self._host(tick, outcome)
+            # After the command has acted: it may clear the flag that holds HI, or raise one.
             self._put_hi(tick)
 
     def data_out(self, tick: int) -> int:
@@ -500,6 +502,7 @@ class Lm629:
 
     def _command(self, tick: int) -> None:
         """A command byte: act on it, prepare its answer, or wait for its words."""
+        # First: a command that drops another one's last words must not find half a parameter in the buffers.
         if self.port.abandoned:
             self._complain(self.options.unfinished_flags)
             self.trajectory_buffer.abandon()
@@ -511,6 +514,7 @@ class Lm629:
             self.port.reply(_WORDS_OUT[opcode], self._answer(tick, opcode))
         else:
             self._finished(tick)
+            # After `_finished`: RESET forgets the command, and it would not be logged.
             self._execute(tick, opcode)
 
     def _execute(self, tick: int, opcode: int) -> None:
@@ -580,6 +584,7 @@ class Lm629:
 
     def _answer(self, tick: int, opcode: int) -> int:
         """What a reading command says, as it is when the command arrives."""
+        # Now, not when the words are read: both words of a position have to be of one moment.
         if opcode == _RDSIGS:
             return self.signals.word
         if opcode == _RDRP and self.options.read_position == "sample":

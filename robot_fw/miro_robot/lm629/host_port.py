@@ -85,6 +85,7 @@ class HostPort:
 
     def reset(self, lock: int) -> None:
         """Forget the command in progress, and whatever strobe is on its way."""
+        # Levels of the pins are not reset: they are the host's, and a strobe may be low.
         self.lock = lock
         self.busy_until = 0
         self.fate = _IGNORED
@@ -115,6 +116,7 @@ class HostPort:
         # With both strobes low the write wins (B4).
         reading = 1 if cs == 0 and rd == 0 and wr != 0 else 0
         outcome = _NOTHING
+        # What was under way ends before anything begins: one change of the pins may do both.
         if self.writing and not writing:
             outcome = self._write_ends(tick)
         elif self.reading and not reading:
@@ -149,6 +151,7 @@ class HostPort:
             self.drive = self.buffer
         elif self.words_left > 0 and not self.incoming:
             self.fate = _ACCEPTED
+            # High word and high byte first (SNVS781, data I/O).
             self.drive = self.answer >> (16 * self.words_left - 8 * self.low_next - 8) & 0xFF
         else:
             self.drive = self.buffer
@@ -164,6 +167,7 @@ class HostPort:
         if self.ps == 0:
             # A command that comes before the last word of the one before it drops that one (E3).
             self.abandoned = 1 if self.words_left > 0 else 0
+            # The byte at the end of the strobe: what was on the bus before does not count.
             self.command = self.data
             self.words_left = 0
             self.low_next = self.low_next if self.keeps_phase else 0

@@ -114,6 +114,7 @@ class ProfileGenerator:
         """Velocity moves towards `goal` by at most the acceleration, the position by the new velocity."""
         velocity = self.velocity
         if velocity < goal:
+            # `min`: without it the velocity would swing around its goal by an acceleration.
             velocity = min(velocity + self.acceleration, goal)
         else:
             velocity = max(velocity - self.acceleration, goal)

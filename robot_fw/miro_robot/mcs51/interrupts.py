@@ -52,6 +52,7 @@ class Interrupts:
 
         The serial port tells of what it sent before it tells of what it received.
         """
+        # A flag that is up already keeps its first cycle: set again, it would be latched later than it was.
         if self.until[source] != NEVER_TICK:
             self.since[source] = cycle
             self.until[source] = NEVER_TICK
@@ -61,6 +62,7 @@ class Interrupts:
 
     def withdraw(self, source: int, cycle: int) -> None:
         """The source's flag is no longer seen at S5P2 of `cycle`."""
+        # A flag that is down keeps its last cycle: cleared twice, it would seem to have been up until now.
         if self.until[source] == NEVER_TICK:
             self.until[source] = cycle
 
@@ -87,9 +89,11 @@ class Interrupts:
         latched = boundary - 2
         chosen = -1
         for source in range(6 if waiting else 0):
+            # Latched two cycles before: a flag of the last cycle waits for the next poll.
             if (waiting >> source) & 1 and self.since[source] <= latched < self.until[source]:
                 if (self.ip >> source) & 1:
                     return source  # the first of the high level wins over every low one
+                # Within a level the first in polling order (4316E section 2.16).
                 if chosen < 0:
                     chosen = source
         return chosen
@@ -101,9 +105,11 @@ class Interrupts:
         for source in range(6 if waiting else 0):
             if not (waiting >> source) & 1:
                 continue
+            # Its last copy has been polled: nothing more comes of it.
             if self.until[source] <= now - 2:
                 self.asked &= ~(1 << source)
             else:
+                # IE, IP or a routine may have held it back: then it is due now.
                 boundary = max(self.since[source] + 2, now)
                 if boundary - 2 < self.until[source] and boundary < earliest:
                     earliest = boundary
@@ -111,9 +117,11 @@ class Interrupts:
 
     def enter(self, source: int) -> None:
         """Its routine is called."""
+        # By IP as it is now: changing IP within the routine does not change the level that RETI ends.
         self.in_service |= 1 + ((self.ip >> source) & 1)
 
     def after_load(self) -> None:
+        # Not saved: any of them may wait. Those that do not are left out at the next look.
         self.asked = 0x3F
 
     def leave(self) -> None:
@@ -141,6 +149,7 @@ class ExternalInterrupts:
         self.levels = (self.levels & (3 ^ bit)) | (level << number)
         if (self.control >> (2 * number)) & 1 == 0:
             self._follow(number, cycle)
+        # A fall sets the flag; that the pin rises again does not clear it.
         elif level == 0:
             self.control |= 2 << (2 * number)
             self.interrupts.ask(2 * number, cycle)
@@ -149,6 +158,7 @@ class ExternalInterrupts:
         """TCON.3:0 is written; `cycle` is the first to see it."""
         self.control = value & 0x0F
         for number in range(2):
+            # In level mode what software writes to IE has no effect: the flag is the pin.
             if (value >> (2 * number)) & 1 == 0:
                 self._follow(number, cycle)
             else:

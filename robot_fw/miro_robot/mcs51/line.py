@@ -79,6 +79,7 @@ class Line:
             raise ValueError(f"edge at tick {tick} comes after one at tick {last}")
         if level != self._last_level():
             self._end -= 1
+            # Else both would pass over the edge that takes the place of the one that is gone.
             if self._cursor > self._end:
                 self._cursor = self._end
             if self._heard > self._end:
@@ -105,6 +106,7 @@ class Line:
     def level_at(self, tick: int) -> int:
         """Level after all edges with edge tick <= `tick`."""
         self._seek(tick)
+        # Levels are not stored: each edge is a change, so their number tells.
         return self._before ^ ((self._cursor - self._first) & 1)
 
     def next_edge(self, tick: int) -> int:
@@ -148,11 +150,13 @@ class Line:
         # Each edge that is dropped has toggled the level.
         self._before ^= (self._cursor - self._first) & 1
         self._first = self._cursor
+        # What is dropped cannot be heard any more; `full` would count it for ever.
         if self._heard < self._first:
             self._heard = self._first
 
     def hear(self, tick: int) -> None:
         """The listener has read all edges below `tick`; later ones wait."""
+        # Below `tick`, not on it: an edge there may still be taken back by a second write.
         while self._heard < self._end and self._ticks[self._heard & self._mask] < tick:
             self._heard += 1
         self.full = self._end - self._heard > _WAITING and not self.unread

@@ -71,6 +71,7 @@ class Timers:
     def sync(self, cycle: int) -> None:
         """Counts through all cycles below `cycle`."""
         if cycle > self.synced:
+            # Before `due` nothing overflows: a timer that runs costs nothing until then.
             if cycle > self.due:
                 self._pass(cycle)
             self.synced = cycle
@@ -124,6 +125,7 @@ class Timers:
     def _begin(self, part: int) -> None:
         """From now on it counts cycles."""
         self.start[part] = self.synced - self.value(part)
+        # `min`: another timer may overflow before.
         self.due = min(self.due, self.start[part] + self.top[part] - 1)
 
     def mode(self, timer: int) -> int:

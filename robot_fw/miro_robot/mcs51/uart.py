@@ -103,6 +103,7 @@ class Uart:
 
     def abort(self, tick: int) -> None:
         """Both state machines to idle: reset, and a change of mode; with everything below `tick` done."""
+        # The line goes back to mark, unless P3.1 holds it low.
         self.txd.append(tick, self.latch >> 1)
         self.tx_left = 0  # how many bits are still to be sent; 0 idle
         self.tx_edge = NEVER_TICK  # tick at which tx_coming replaces tx_level
@@ -172,6 +173,7 @@ class Uart:
     def write_latch(self, latch: int, tick: int) -> None:
         """P3.1:0 is written; called with everything below `tick` done."""
         self.latch = latch
+        # At once, also within a bit: the latch and the transmitter are ANDed at the pin.
         self.txd.append(tick, self.tx_level & (latch >> 1))
 
     def raise_flag(self, flag: int, tick: int) -> None:
@@ -290,6 +292,7 @@ class Uart:
         while self.rx_next < tick and self.rx_count:
             state = self.rx_count & _COUNTER_BITS
             now = self.rx_next
+            # Only where no vote of this bit has been taken.
             if (state <= _VOTE_FIRST or state > _ACTION) and self._unanimous(tick):
                 continue
             if state < _VOTE_FIRST or state > _ACTION:
@@ -298,6 +301,7 @@ class Uart:
                     idle = (tick - 1 - now) // period + 1
                 self.rx_count += idle
                 self.rx_next = now + idle * period
+                # Also where ticks are skipped: after a start bit that was noise the search goes on from it.
                 self.rx_last = self.level(self.rx_next - period)
                 continue
             level = self.level(now)
@@ -315,7 +319,9 @@ class Uart:
         idle = (_VOTE_FIRST - self.rx_count) & _COUNTER_BITS
         first = self.rx_next + idle * period
         number = (self.rx_count + idle) >> 4
+        # At most to the last bit: it decides what comes next, as the start bit does by itself.
         most = _LAST_BIT + 1 - number if 1 <= number <= _LAST_BIT else 1
+        # The wire is asked, and P3.0 holds the pin low whatever that does.
         if not self.latch & 1:
             return False
         sampled = self.rxd.samples(first, _ROLLOVERS * period, 3 * period, tick, most)

@@ -362,13 +362,16 @@ class Nets:
         try:
             for index in range(self.part_count):
                 if self.next_ticks[index] <= tick:
+                    # All feeders before all events: a part must not see where its motor was earlier.
                     for place in range(self.kin_first[index], self.feeder_end[index]):
                         self._call(self.kin[place], _ADVANCE, tick)
             for index in range(self.part_count):
                 if self.next_ticks[index] <= tick:
                     self._call(index, _DUE, tick)
+            # After all of them: what they drive on one tick takes effect together, whatever their order.
             self._spread_waves(tick)
         except (Exception, SystemExit) as error:
+            # No part was being called: the error is ours, and needs its traceback.
             if self.called < 0:
                 raise
             raise self._explained(error, tick) from error
@@ -391,6 +394,7 @@ class Nets:
 
     def put_latch(self, port: int, latch: int) -> None:
         """A port drives other levels; no waves yet."""
+        # Only bits that something is on, or that are observed: a bus on P0 writes thousands of others.
         changed = (self.latches[port] ^ latch) & self.live[port]
         self.latches[port] = latch
         number = 8 * port
@@ -466,6 +470,7 @@ class Nets:
             count = self.waiting_count
             self.waiting_count = 0
             for place in range(count):
+                # Before the call, which may make it wait again, for the next wave.
                 self.is_waiting[self.waiting[place]] = 0
                 self._call(self.waiting[place], _CHANGED, tick)
 
@@ -523,12 +528,14 @@ class Nets:
             self.faults += part.faults
             part.faults = []
         tick = part.next_tick
+        # `_NEVER`: what no pin of the CPU hears must not hold the CPU up.
         reach_tick = max(tick, part.reach_tick) if self.reaches[index] else _NEVER
         before = self.next_ticks[index]
         reach_before = self.reach_ticks[index]
         if tick != before or reach_tick != reach_before:
             self.next_ticks[index] = tick
             self.reach_ticks[index] = reach_tick
+            # It was the earliest and may be no more: only then are all 64 looked at.
             if before == self.next_tick or reach_before == self.reach_tick:
                 self._earliest()
             else:
@@ -545,6 +552,7 @@ class Nets:
             part.moved = 0
             pin = 0
             while moved:
+                # A part may have driven a pin there and back in one call: that is no change.
                 if moved & 1 and part.wanted[pin] != part.drives[pin]:
                     self._add_drive(index, pin, part.drives[pin], -1)
                     part.drives[pin] = part.wanted[pin]
@@ -567,6 +575,7 @@ class Nets:
             net = self.touched[place]
             self.is_touched[net] = 0
             level = self._level(net, 0, 0)
+            # `_show` below is called even if not: a second driver changes what a part sees beside its own.
             changed = level != self.levels[net]
             self.levels[net] = level
             self._show(net)
@@ -575,6 +584,7 @@ class Nets:
                 if self.observed[net]:
                     self._report(tick, net, level)
             both = 1 if self.lows[net] > 0 and self.highs[net] > 0 else 0
+            # Noted only: within the tick two drivers may meet for no time, which is no fault (`judge`).
             if both != self.contended[net] and not self.is_suspect[net]:
                 self.is_suspect[net] = 1
                 self.suspects[self.suspect_count] = net
@@ -646,6 +656,7 @@ class Nets:
                 begun.append(net)
             self.contended[net] = both
         self.suspect_count = 0
+        # They were noted in the order of events; faults of one tick are in the order of nets.
         return sorted(begun)
 
     # Ports

@@ -56,6 +56,7 @@ class Network(Medium):
     ) -> None:
         robots = [
             Robot(robot, scenario, index, spec.robots, seed, image)
+            # The order in the file must not change a bit: all loops over robots follow this one.
             for robot in sorted(spec.robot, key=lambda robot: robot.slot)
         ]
         radio = spec.radio
@@ -76,6 +77,7 @@ class Network(Medium):
             index,
             "script" if script is not None else spec.host,
             robots,
+            # A carrier that is always on needs no time to come up.
             Outbox(0 if radio.carrier == "on" else radio.keyup_ticks, index),
             HostLog(index, self.uplink.known_tick, spec.robots),
             self.downlink.sender.latency,
@@ -97,6 +99,7 @@ class Network(Medium):
 
     def begin_period(self, tick: int) -> None:
         """Camera, PC and station, in this order."""
+        # All robots before any pilot computes: they are on one picture.
         measured = self.sight.expose(tick)
         self.sent = []
         steered = self.host == "controller"
@@ -126,6 +129,7 @@ class Network(Medium):
 
     def settle(self, rendezvous_tick: int) -> None:
         """All networks have sent: the line is known up to where the robots stop next."""
+        # Further than the stop: the last instruction before it may read RXD some cycles later.
         self.downlink.settle(rendezvous_tick + SETTLE_TICKS)
 
     def free_tick(self) -> int:
@@ -154,6 +158,7 @@ class Network(Medium):
         received = self.uplink.receive(tick)
         if not received:
             return
+        # Characters first: the answer is an event right after its last one.
         self.log.note_heard(received)
         for frame in self.telemetry.receive(received):
             if isinstance(frame, Received):
@@ -207,6 +212,7 @@ class Network(Medium):
 
     def check_times(self, earliest_tick: int, tick: int) -> None:
         settled_tick = self.downlink.settled_tick
+        # At tick 0 nothing has been settled yet.
         if settled_tick != tick + SETTLE_TICKS and settled_tick + tick != 0:
             raise ValueError(f"the radio is settled up to tick {settled_tick}, at tick {tick}")
         if not earliest_tick <= self.uplink.now <= tick:
@@ -235,6 +241,7 @@ def networks_of(
             listener.downlink.overhear(neighbour.downlink)
     for network in networks:
         if isinstance(network.sight, PixelSight):
+            # Only here all of them exist: robots of the other network are in the picture, too.
             network.sight.everyone = [robot for each in networks for robot in each.robots]
     return networks
 
