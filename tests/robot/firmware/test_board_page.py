@@ -13,16 +13,20 @@ RDSIGS = 0x0C
 
 
 def rows(heading):
-    """The cells of the tables below a heading, without heads."""
+    """The cells of the text in columns below a heading: its head says where each column begins."""
     part = PAGE.split(f"### {heading}\n")[1].split("\n##")[0]
-    lines = [line for line in part.splitlines() if line.startswith("| ")]
-    return [[cell.strip() for cell in line.strip("|").split("|")] for line in lines]
+    head, *lines = part.split("```text\n")[1].split("```")[0].splitlines()
+    starts = [match.start() for match in re.finditer(r"(?:^|(?<=  ))\S", head)]
+    return [
+        [line[start:end].strip() for start, end in zip(starts, [*starts[1:], None], strict=True)]
+        for line in lines
+    ]
 
 
 def said(when):
-    """What the page says a chip is told, as hex strings: the codes of its row."""
+    """What the page says a chip is told, as hex strings: the codes of its row, before a semicolon."""
     (row,) = [row for row in rows("LM629: what a robot says, byte by byte") if row[0].startswith(when)]
-    return [code.replace(" ", "").lower() for code in re.findall(r"`([^`]*)`", row[2])]
+    return [code.replace(" ", "").lower() for code in row[2].partition(";")[0].split(", ")]
 
 
 def told(rig):
@@ -68,7 +72,7 @@ def test_stop_and_motors_off_on_the_page_are_the_firmwares():
 
 def test_each_opcode_and_its_words_stand_on_the_page():
     found = {}
-    for names, opcodes, data, _ in [row for row in rows("LM629: the commands") if len(row) == 4][1:]:
+    for names, opcodes, data, _ in rows("LM629: the commands"):
         for name, opcode in zip(names.split(", "), opcodes.split(", "), strict=True):
             found[name] = (int(opcode.rstrip("h"), 16), data)
     assert {name: opcode for name, (opcode, _) in found.items()} == {one.name: one.opcode for one in COMMANDS}
