@@ -1,4 +1,4 @@
-"""Mirotwin: what people do with the world, and the name they import.
+"""Mirotwin's Python interface: load firmware and scenarios, run worlds, wait for conditions.
 
     import mirotwin
 
@@ -14,9 +14,9 @@ from mirotwin import conform as _conform  # noqa: F401  adds its check, whoever 
 
 
 def names_of_stub(package):
-    """The `__getattr__` of a package whose `__init__.pyi` says where its names come from, a line each.
+    """The `__getattr__` of a package whose `__init__.pyi` lists its names, one import a line.
 
-    (lazy_loader takes no names of other packages, and 5 ms to read a stub.)
+    (lazy_loader takes no names of other packages, and needs 5 ms to read a stub.)
     """
     import re
     import sys

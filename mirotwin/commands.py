@@ -43,8 +43,8 @@ FIRMWARE = {
 def fw() -> None:
     """Firmware: run on the bare processor, disassemble, trace, profile.
 
-    SUBJECT is what runs: an IMAGE.ihx on the bare processor, or the robot in a scenario (a built-in name or a .toml),
-    in a recording (run.mcap) or on a stream file.
+    SUBJECT: an IMAGE.ihx on the bare processor, or the robot in a scenario (a built-in name or a .toml), in a recording
+    (run.mcap) or on a stream file.
     """
 
 
@@ -58,7 +58,7 @@ CAMPAIGN = {
 
 
 class CampaignGroup(LazyGroup):
-    """What is no command's name is the file of `run`."""
+    """A first argument that is no command's name is the FILE of `run`."""
 
     def parse_args(self, ctx: click.Context, args: list[str]) -> list[str]:
         if args and args[0] not in (*CAMPAIGN, *ctx.help_option_names):
@@ -74,7 +74,7 @@ class CampaignGroup(LazyGroup):
 def campaign() -> None:
     """Runs a scenario over seeds and values of its keys, and shows the results.
 
-    FILE.toml says which runs; `mirotwin examples campaign` writes one.
+    FILE.toml defines the runs; `mirotwin examples campaign` writes an example.
     """
 
 

@@ -1,1 +1,1 @@
-"""Pictures for people: what the camera saw, what the tracker made of it, pictures of their own, control points."""
+"""Camera commands: show a camera picture, run the tracker on pictures, calibrate from control points."""

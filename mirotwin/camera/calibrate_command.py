@@ -104,17 +104,18 @@ def calibrate(options: CalibrateOptions) -> None:
     """Finds the camera that draws control points nearest to where they were measured, and writes it as a calibration.
 
     A control point is a place on the pitch (cm, in the axes of the scenarios) and its height, and the pixel that shows
-    it. Points at one height tell the lens and the tilt as far as they matter there; points on the floor and on robots'
-    tops tell all. Points of a simulated camera show the form:
+    it. Points at one height determine lens and tilt well enough for that height; points on the floor and on robots'
+    tops determine all parameters. Points of a simulated camera show the form:
 
     \b
         mirotwin camera calibrate --scenario fig6 --out camera.toml --points-out points.csv
         mirotwin camera calibrate --points points.csv --out camera.toml --force
 
-    Pixels sampled from one's own pictures, at least 4 of each patch's colour, of the floor and of the ball if there is
-    one, tell the colour classes: --samples. Names: yellow, blue, magenta, cyan, green, violet, lime, orange, floor.
+    With --samples the colour classes are found from pixels that you sampled from your pictures: at least 4 of each
+    patch's colour, of the floor, and of the ball if there is one. Names: yellow, blue, magenta, cyan, green, violet,
+    lime, orange, floor.
 
-    Prints what remains between measured and drawn pixels. `track` takes the files of --out and --colours-out.
+    Prints the remaining distance between measured and drawn pixels. `track` takes the files of --out and --colours-out.
     """
     points, scenario, samples = options.points, options.scenario, options.samples
     if points is None and scenario is None:
@@ -155,7 +156,8 @@ def _check_outputs(options: CalibrateOptions) -> None:
 
 
 def _of_scenario(name: str, initial: CameraParameters | None, options: CalibrateOptions) -> _Found:
-    """Points, calibration and perhaps colours of a scenario's camera. Raises BadInput for one that sees nothing."""
+    """Points, calibration and perhaps colours of a scenario's camera. Raises BadInput for a camera without a picture.
+    """
     colours = options.colours_out is not None
     text = load(name, options.settings)
     tell_notes(text.notes)
@@ -209,7 +211,7 @@ def _by_residual(points: Sequence[ControlPoint], off_px: Sequence[float]) -> Tab
 FLOOR_CM = (range(-10, 121, 26), range(-10, 81, 18), 0.0)
 """Columns, rows and height of the marks on the floor: from edge to edge of the pitch."""
 TOPS_CM = (range(-5, 116, 24), range(-5, 76, 16), 7.5)
-"""Of those on robots' tops: as near to the edge as a robot can stand."""
+"""Points on robots' tops: x range, y range, height, in cm. They reach as near to the edge as a robot can get."""
 
 
 def marks_text(camera: CameraParameters, noise_px: float, seed: int) -> str:

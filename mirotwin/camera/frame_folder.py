@@ -20,10 +20,9 @@ _OURS = re.compile(r"(net[0-9]+-)?frame-[0-9]{6,}(\.part)?\.png")
 
 
 class FrameFolder:
-    """`path` for the frames of one run.
-
-    Checks at once. Raises OutputError for what is no folder, one with content (unless `force`), and a full disk.
-    `fill` makes it, removes frames of an earlier run, and saves those of views from then on.
+    """The folder `path` for the frames of one run, checked at once. Raises OutputError if it is no folder, if it has
+    content (unless `force`), and for a full disk. `fill` makes the folder, removes frames of an earlier run, and saves
+    the frames of views from then on.
     """
 
     def __init__(self, path: Path, force: bool = False) -> None:
@@ -48,7 +47,7 @@ class FrameFolder:
             view.shows.append(save)
 
     def _open(self) -> None:
-        """Ready for the first frame: no frame of an earlier run stands beside those of this one."""
+        """Makes the folder and removes frames of an earlier run, so that no old frame lies beside new ones."""
         with refused(self.path, _REMEDY):
             self.path.mkdir(parents=True, exist_ok=True)
             for name in entries(self.path, OPTION):
@@ -56,7 +55,7 @@ class FrameFolder:
                     (self.path / name).unlink()
 
     def _add(self, name: str, data: bytes, undisturbed: AbstractContextManager[object]) -> None:
-        """Writes a file; `undisturbed` puts off what an exception out of the blue would leave half-written."""
+        """Writes a file; `undisturbed` delays asynchronous exceptions that would leave it half-written."""
         part = self.path / part_name(name)
         with undisturbed:
             try:

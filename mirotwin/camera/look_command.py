@@ -1,4 +1,4 @@
-"""`mirotwin camera look`: one picture of what the camera sees, and what the tracker makes of it."""
+"""`mirotwin camera look`: one camera picture, with the tracker's result drawn on it."""
 
 from __future__ import annotations
 

@@ -1,8 +1,8 @@
-"""A picture enlarged, with what the tracker made of it drawn on it.
+"""An enlarged picture with the tracker's result drawn on it.
 
 thin grey frame          a window in which a robot was looked for and found; red: it was not found there in the end
 thin blue frame          a window of the search of the whole picture
-coloured outline         pixels that the tracker took for that colour, in the windows
+coloured outline         pixels that the tracker classified as that colour, in the windows
 small cross              centroid of a patch
 arrow, "2 0.93"          measured posture, number of the robot, confidence
 "2 lost"                 at the window in which it was looked for last, if there is one, and below the picture
@@ -45,7 +45,7 @@ ARROW_M = 0.07
 """From the middle of the robot; its edge is at 3.75 cm."""
 HEAD_M = 0.018
 ROBOT_PX = 34
-"""Half of what a robot covers of the enlarged picture."""
+"""Half the size of a robot in the enlarged picture, in pixels."""
 ASIDE_PX = 56
 """From the middle of a robot to its label: outside of the usual window."""
 
@@ -61,7 +61,7 @@ class Box(NamedTuple):
     bottom: float
 
     def shared(self, other: Box) -> float:
-        """Area of what both cover."""
+        """Area of the intersection of both boxes."""
         width = min(self.right, other.right) - max(self.left, other.left)
         height = min(self.bottom, other.bottom) - max(self.top, other.top)
         return max(width, 0.0) * max(height, 0.0)
@@ -151,7 +151,7 @@ def _draw_arrows(image: Image.Image, tracker: Tracker, pairs: Sequence[Pair | No
 
 
 def _arrow(tracker: Tracker, pair: Pair) -> tuple[Point, Point, Point, Point] | None:
-    """Tail, tip and both ends of the head in the enlarged picture; None where the lens cannot draw them."""
+    """Tail, tip and both ends of the head in the enlarged picture; None where the lens cannot project them."""
     sighting = pair.sighting
     sine, cosine = sincos(sighting.theta_rad)
     ends = ((0.0, 0.0), (ARROW_M, 0.0), (ARROW_M - HEAD_M, 0.6 * HEAD_M), (ARROW_M - HEAD_M, -0.6 * HEAD_M))
@@ -221,7 +221,7 @@ def _around(middle: Point, reach: float) -> Box:
 
 
 def _places(label: _Label, width: float, height: float) -> list[Box]:
-    """Where a label may stand: above, below, at the sides, at the corners."""
+    """Candidate places of a label: above, below, at the sides, at the corners."""
     (x, y), away = label.at, label.away
     left, right, middle = x - away - width, x + away, x - 0.5 * width
     up, down, level = y - away - height, y + away, y - 0.5 * height

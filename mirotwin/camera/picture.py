@@ -1,7 +1,7 @@
 """A whole picture of the camera: its pixels as the tracker reads them, and as a file that people can open.
 
-A picture that was saved and read again differs from the first by rounding, a level or two, and where noise made a pixel
-that no red, green and blue can show, by what was cut off.
+A picture that was saved and read again differs from the original by rounding (a level or two). Where noise made a pixel
+that no red, green and blue can show, it also differs by the clipped part.
 """
 
 from __future__ import annotations
@@ -37,7 +37,7 @@ _ROWS = 12
 
 
 class Picture:
-    """A picture that stays as it is. It is `Pixels`, so a tracker can look at it.
+    """An immutable picture. It implements `Pixels`, so a tracker can read it.
 
     `data`: three bytes a pixel; `pixels`: the same as rows of pixels.
     """
@@ -65,7 +65,7 @@ class Picture:
 
 
 def taken(frame: Pixels) -> Picture:
-    """The whole picture of what may only be read by windows."""
+    """The whole picture, copied from `frame`, which can only be read by windows."""
     return Picture(b"".join(frame.window(0, top, WIDTH, _ROWS) for top in range(0, HEIGHT, _ROWS)))
 
 
@@ -77,7 +77,10 @@ def png(image: Image.Image) -> bytes:
 
 
 def read(path: Path) -> Picture:
-    """The picture in a PNG or PPM file. Raises BadInput for another size and for what is no picture."""
+    """The picture in a PNG or PPM file.
+
+    Raises BadInput for a picture of another size and for a file that is no picture.
+    """
     try:
         data = read_input(path, PICTURE_BYTES)
     except OSError as error:

@@ -25,7 +25,7 @@ _OF_NETWORK = re.compile(r"net([0-9]{1,9})-frame-.*")
 
 
 class Still(NamedTuple):
-    """A picture, what it is called, and the tick of its exposure."""
+    """A picture, its name, and the tick of its exposure."""
 
     name: str
     tick: int
@@ -33,7 +33,7 @@ class Still(NamedTuple):
 
 
 def stills(path: Path, network: int, tell: Callable[[str], None]) -> Iterator[Still]:
-    """The pictures in a folder or a recording; `tell` gets a message for a recording that was broken off.
+    """The pictures in a folder or a recording; `tell` gets a message if the recording is incomplete.
 
     Raises BadInput for a folder or file without pictures, and for a picture that cannot be used.
     """

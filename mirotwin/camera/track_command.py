@@ -1,4 +1,4 @@
-"""`mirotwin camera track`: the tracker on pictures of one's own."""
+"""`mirotwin camera track`: runs the tracker on pictures in a folder or a recording."""
 
 from __future__ import annotations
 

@@ -20,8 +20,8 @@ NO_PIXELS = 'choose kind = "pixels" in [camera]; here: --set \'camera={kind="pix
 class View:
     """Looks at every frame of network `network` from now on; each of `shows` is called with this view.
 
-    `label` begins the caption. `frame`, `tick`: of the last frame; `missed`: the PC never got it (dropped, or the one
-    before came again).
+    `label` begins the caption. `frame`, `tick`: the last frame and its tick; `missed`: the PC did not get it (it was
+    dropped, or the previous frame was delivered again).
     """
 
     def __init__(self, sight: PixelSight, network: int, label: str) -> None:

@@ -1,4 +1,4 @@
-"""Many runs: what a run is made from, the row of figures that it leaves, and the workers that make the rows.
+"""Campaigns of many runs: the plan, the row of figures of each run, and the workers that compute the rows.
 
     from mirotwin import campaign
 
@@ -7,8 +7,7 @@
         campaign.run(plan, "noise.parquet")             # or with any executor of concurrent.futures
         table, about = campaign.read("noise.parquet")   # an Arrow table, a row a run
 
-Names, those of the stub beside this file, are loaded on first use: workers read this file before their engine is
-chosen.
+The names of the stub beside this file are loaded on first use: workers import this file before their engine is chosen.
 """
 
 from mirotwin import names_of_stub

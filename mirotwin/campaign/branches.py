@@ -1,8 +1,8 @@
-"""Branches of a run: its world as it was at the end of a control period, with the noise of other seeds from there on.
+"""Branches of a run: the world at the end of a control period, continued with the noise of other seeds.
 
-A branch is a run of its own: the same script with `reseed` in it. Where a process can be copied (`fork`), all branches
-of a moment go on from copies of the one process that came there: of the world, of its checks with all they have seen,
-and of what steps wait for. Elsewhere each branch begins at the first tick, and comes to the same verdict.
+A branch is a run of its own: the same script with `reseed` in it. Where a process can be copied (`fork`), one process
+runs to the moment and is copied for each branch, with the world, the state of its checks and the pending steps.
+Elsewhere each branch runs from the first tick, with the same verdict.
 """
 
 from __future__ import annotations
@@ -23,7 +23,7 @@ from mirotwin.runs.spec import RunSpec
 from mirotwin.verify.checks.interface import Failure
 
 STEP = "step"
-"""What failed where it was no check."""
+"""Name of the failure where a step failed and no check."""
 FROM_START = -1
 """In place of a tick: the seed is another one from the start, with other wheels and another calibration."""
 PASSED, FAILED, BROKEN = 0, 1, 70
@@ -50,7 +50,7 @@ class Point(msgspec.Struct, frozen=True):
 
 
 class _AllBranched(Exception):
-    """The process that is copied has come to its end."""
+    """Raised in the copied process when all branches are done."""
 
 
 def failure_of(run: Run, name: str = "") -> Failure | None:
@@ -60,14 +60,14 @@ def failure_of(run: Run, name: str = "") -> Failure | None:
 
 
 def has_failed(run: Run, name: str) -> bool:
-    """True if that check failed; or a step, if that is what failed."""
+    """True if the check `name` failed; for `STEP`, if a step failed."""
     if name == STEP:
         return run.player is not None and run.player.failure is not None
     return failure_of(run, name) is not None
 
 
 def branch(spec: RunSpec, tick: int, seed: int) -> RunSpec:
-    """The run whose noise is that of `seed` from the end `tick` of a control period on."""
+    """The run with the noise of `seed` from tick `tick`, the end of a control period, on."""
     if tick == FROM_START:
         return replace(spec, seed=seed)
     lines = range(len(getattr(spec.scenario, "networks", ())) or 1)
@@ -79,7 +79,7 @@ def branch(spec: RunSpec, tick: int, seed: int) -> RunSpec:
 
 
 def branched(spec: RunSpec, name: str, tick: int, seeds: Sequence[int], jobs: int = 1) -> Point:
-    """What becomes of the branches at `tick`, `jobs` of them at once. `name`: of the check that fails."""
+    """Runs the branches at `tick`, `jobs` at a time, and counts failures. `name`: the check that fails."""
     if not CAN_COPY:
         return Point(tick, tuple(has_failed(Run(branch(spec, tick, seed)).play(), name) for seed in seeds))
     codes: list[int] = []
@@ -146,11 +146,11 @@ def _copied(seeds: Sequence[int], jobs: int, codes: list[int]) -> int | None:
 def search(
     branches: Callable[[int], Point], end: int, coarse: int, done: Callable[[Point], object]
 ) -> tuple[list[Point], int]:
-    """Points in the order of time, and the index of the control period in which failing became more likely than not.
+    """Points in the order of time, and the index of the control period in which the failure rate passes one half.
 
-    `branches`: those at the end of so many control periods; `end`: after that many the check has failed. At first there
-    are about `coarse` points; then the distance is halved in which the last of those below a half is, until that is
-    one control period. -1: it was so from the start.
+    `branches(n)`: the branches at the end of control period n; `end`: the control periods after which the check has
+    failed. The search begins with about `coarse` points. It then halves the interval after the last point below one
+    half until that interval is one control period. The index is -1 if the rate was above one half from the start.
     """
     points: dict[int, Point] = {}
 

@@ -32,7 +32,7 @@ from mirotwin.shell.verdicts import DONE, exit_code
 from mirotwin.verify.expectations import Expected, as_settings
 
 LINES = 5
-"""Runs that went wrong are named, so many at most."""
+"""Largest number of failed runs named on the console."""
 
 
 def _share(text: str) -> tuple[int, int]:
@@ -85,16 +85,15 @@ class CampaignOptions(Options, frozen=True, kw_only=True):
 
 @command_of(CampaignOptions)
 def run(options: CampaignOptions) -> int:
-    """Makes the runs of FILE.toml, or of the built-in campaign `bench2`, and writes a row for each to a Parquet file.
+    """Runs the campaign in FILE.toml, or the built-in campaign `bench2`, and writes a row for each run to a Parquet
+    file.
 
-    A campaign that is broken off goes on when the same command is given again; nothing but the runs under way is lost
-    (FILE.part.jsonl). The file is the same whatever ran it, byte for byte; how long the runs took is in
-    FILE.wall.parquet.
+    To resume an interrupted campaign, give the same command again; only the runs under way are lost (FILE.part.jsonl).
+    The file is the same byte for byte on every machine and with any number of jobs; wall times are in
+    FILE.wall.parquet. If no run fails, a line gives the highest failure rate that is still possible at 95 %.
 
-    Where no run fails, a line says which failure rate that leaves possible.
-
-    Exit code 2: a run has an error; 3: the firmware did what it must not; 1: more runs than allowed_failed_share failed
-    a check, or had no occasion for it. The rows say which.
+    Exit code 2: a run has an error; 3: a firmware fault; 1: more runs than allowed_failed_share failed a check, or
+    could not be judged by it. The rows name the runs.
     """
     require_arrow()
     options.plugins.bring()
@@ -146,7 +145,7 @@ def _run(plan: Plan, results: Path, options: CampaignOptions) -> Tally:
 
 
 def _judge(plan: Plan, results: Path, has_flips: bool) -> int:
-    """Says what went wrong; returns the exit code. That a flip changed nothing is a result."""
+    """Reports the failed runs; returns the exit code. A flip that changed nothing is a result, no failure."""
     counts = counted(results, LINES)
     for verdict, (count, first) in counts.items():
         if verdict != "passed" and not (has_flips and verdict == "not judged"):
@@ -177,7 +176,7 @@ def _judge(plan: Plan, results: Path, has_flips: bool) -> int:
 
 
 def _list(verdict: str, first: Sequence[tuple[int, str]]) -> None:
-    """One line for each text; of those that repeat it, only their numbers."""
+    """Prints one line for each distinct text; runs that repeat a text are listed by number only."""
     runs: dict[str, list[int]] = {}
     for run, text in first:
         runs.setdefault(text, []).append(run)

@@ -76,11 +76,11 @@ class ShowOptions(Options, frozen=True, kw_only=True):
 def show(options: ShowOptions) -> int:
     """Shows medians with their 95 % intervals, and the spread, of each combination of factors.
 
-    --between and --against pair runs with the same seed, and the same values of all else. A metric has got worse when
-    the 95 % interval of its mean difference lies on the bad side of 0 as a whole; of errors and firmware faults one
-    more is worse.
+    --between and --against pair runs with the same seed and the same values of all other factors. A metric is worse
+    when the whole 95 % interval of its mean difference lies on the bad side of 0; one more error or firmware fault is
+    worse, too.
 
-    Exit code 1: something is worse than --against, a line each says what, by how much, and with which interval.
+    Exit code 1: a metric is worse than in --against; a line for each gives the metric, the difference and its interval.
     """
     results, metrics, against, as_json = options.results, options.metrics, options.against, options.as_json
     rows = ResultRows(results)
@@ -128,7 +128,7 @@ def _groups_table(groups: Sequence[Arm]) -> Table:
 
 
 def _labelled(metric: str) -> str:
-    """A metric that is 0 or 1 for each run, with what 1 means."""
+    """The name of a metric; for one that is 0 or 1 per run, with the meaning of 1."""
     if metric.startswith(CHECK):
         return f"{metric} (1: failed)"
     return f"{metric} (1: yes)" if metric in (*SHARES, UNSETTLED) else metric

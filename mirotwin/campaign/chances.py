@@ -1,4 +1,4 @@
-"""How often runs fail: intervals of a share of runs, what clean runs prove, and how many of them a fix needs.
+"""Failure rates: the interval of a share of runs, the bound that clean runs prove, and the clean runs that a fix needs.
 
 The interval of a share is Wilson's ("Probable inference, the law of succession, and statistical inference", Journal of
 the American Statistical Association 22, 1927, doi:10.1080/01621459.1927.10502953). `count` clean runs in a row have the
@@ -14,13 +14,13 @@ import math
 from miro_exact import dmath
 
 DEVIATIONS = 1.96
-"""Of a normal distribution, to either side: 95 %."""
+"""Standard deviations of a normal distribution, to either side, that hold 95 %."""
 UNLIKELY = 0.05
-"""The chance of what is taken for impossible."""
+"""Significance level: an event less likely than this is taken for impossible."""
 
 
 def wilson(count: int, trials: int) -> tuple[float, float]:
-    """The 95 % interval of a share of which `count` of `trials` are a sample."""
+    """Wilson's 95 % interval of a share, from a sample of `count` in `trials`."""
     share, spread = count / trials, DEVIATIONS * DEVIATIONS / trials
     middle = share + spread / 2
     half = DEVIATIONS * math.sqrt(share * (1 - share) / trials + spread / (4 * trials))
@@ -28,7 +28,7 @@ def wilson(count: int, trials: int) -> tuple[float, float]:
 
 
 def highest_rate(clean: int) -> float:
-    """The failure rate that so many clean runs leave possible, at 95 %: 1 - 0.05^(1/clean)."""
+    """The highest failure rate that `clean` clean runs leave possible, at 95 %: 1 - 0.05^(1/clean)."""
     return 1.0 - dmath.exp(dmath.log(UNLIKELY) / clean)
 
 
@@ -42,7 +42,7 @@ def needed_runs(failed: int, runs: int) -> int:
 
 
 def clean_line(seeds: int, was: tuple[int, int] | None = None) -> str:
-    """What so many clean seeds say. `was`: failed seeds and all seeds before a fix."""
+    """One line: the bound that `seeds` clean seeds prove. `was`: failed seeds and all seeds before a fix."""
     text = f"{seeds} clean seeds: failure rate below {100.0 * highest_rate(seeds):.2g} % at 95 %"
     if was is None:
         return text

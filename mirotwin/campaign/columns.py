@@ -1,4 +1,4 @@
-"""The columns of a results file: what each run has, and which figures of `summary.json`.
+"""The columns of a results file: the figures of `summary.json` and others.
 
     run                                    number of the run in the plan, from 0
     one column a factor and a drawn key, `draw` (where something is drawn), `seed`
@@ -7,10 +7,10 @@
     of a board `step_N_ms` too, how long each wait took, and the values that the campaign names, by PART.KEY
     check.NAME                             verdict of that check
 
-To add a column, add a line to `COLUMNS`. It is made from a `Summary` and `Tracks`; what neither has yet is counted in
-`Tracks.add`, which sees every `Period`. Say what it means in docs/formats/parquet.md. A number that is added to a
-struct of `summary.json` (`_PARTS`) becomes one by itself. Statistics, pages and the table of that page
-follow.
+To add a column, add a line to `COLUMNS`. A column is computed from a `Summary` and `Tracks`; figures that neither has
+yet are counted in `Tracks.add`, which gets every `Period`. Describe the column in docs/formats/parquet.md. A number
+that is added to a struct of `summary.json` (`_PARTS`) becomes a column automatically. Statistics, pages and the table
+of that page follow.
 
 Wall times are in a file of their own (`results`), because all the rest is the same on every machine.
 """
@@ -54,9 +54,9 @@ _PARTS: tuple[_Part, ...] = (
     ("vision_", ("vision",), VisionCounts),
     ("", ("firmware",), FirmwareCounts),
 )
-"""Prefix of the columns, where the figures stand in a summary, and their struct."""
+"""Prefix of the columns, path of the figures in a summary, and their struct."""
 _BOARD_PARTS: tuple[_Part, ...] = (("", ("serial",), SerialFigures), ("", ("firmware",), FirmwareCounts))
-"""As `_PARTS`, for the summary of a board."""
+"""Like `_PARTS`, for the summary of a board."""
 
 
 def _kinds(struct: type) -> Iterator[tuple[str, type]]:
@@ -139,6 +139,6 @@ def step_column(number: int) -> str:
 
 
 def place_of(name: str) -> float:
-    """Where a column stands among the figures of several scenarios: steps by their numbers, then values of parts."""
+    """Sort key of a column among the figures of several scenarios: steps by their numbers, then values of parts."""
     step = STEP.fullmatch(name)
     return float(step[1]) if step else math.inf if "." in name else 0.0

@@ -43,8 +43,8 @@ def judged(rows: ResultRows) -> tuple[str, ...]:
 class MetricDifference(msgspec.Struct, frozen=True):
     """A metric in `pairs` pairs of `seeds` seeds: means of both, and of second minus first with its interval.
 
-    `without`: pairs that are left out, because one of the two runs does not have the metric. `median`: of the
-    differences. `higher`, `lower`: in so many pairs the second is. `interval` is None for fewer than 8 seeds.
+    `without`: pairs left out because one of the two runs does not have the metric. `median`: of the differences.
+    `higher`, `lower`: pairs in which the second run is higher or lower. `interval` is None for fewer than 8 seeds.
     """
 
     metric: str

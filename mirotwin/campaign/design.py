@@ -1,4 +1,4 @@
-"""The points of a campaign: every combination of what is varied, the draws, and the seeds, in one order.
+"""The design points of a campaign: every combination of factor levels, draws and seeds, in one order.
 
     run = ((point * draws) + draw) * seeds + seed        point: the last factor changes first
 
@@ -49,10 +49,10 @@ def as_kind(value: Value, kind: type) -> Any:
 
 
 class Level(msgspec.Struct, frozen=True):
-    """One of the values of a factor: as its column shows it, and what it sets.
+    """A level of a factor: its value in the column, and the settings that it makes.
 
-    `settings`: KEY=VALUE, as `--set`. `scenario`, `firmware`: what runs instead of the campaign's own; "" for that.
-    `place`: where the file says it.
+    `settings`: KEY=VALUE, as `--set`. `scenario`, `firmware`: replace the campaign's own; "" keeps it. `place`: file
+    and line, for errors.
     """
 
     value: Value
@@ -72,7 +72,7 @@ class Factor(msgspec.Struct, frozen=True):
 class Draw(msgspec.Struct, frozen=True):
     """A key whose value is drawn: between `low` and `high`, or one of `choices`.
 
-    `scale`: "linear", or "log", where equal ratios are equally likely. `whole`: whole numbers, both ends included.
+    `scale`: "linear", or "log" (equal ratios are equally likely). `whole`: integers, both ends included.
     """
 
     name: str
@@ -114,7 +114,7 @@ class DesignPoint(msgspec.Struct, frozen=True):
 
 
 class Design(msgspec.Struct, frozen=True):
-    """All runs of a campaign. `draw_count` is 1 where nothing is drawn, 0 where each seed has a draw of its own."""
+    """All runs of a campaign. `draw_count`: 1 if nothing is drawn; 0 if each seed has its own draw."""
 
     first_seed: int
     seed_count: int

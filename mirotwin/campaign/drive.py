@@ -1,7 +1,7 @@
-"""Has all missing runs of a plan made by an executor, and hands on each outcome as soon as it is there.
+"""Submits all missing runs of a plan to an executor and yields each outcome when it is ready.
 
-A process that is killed breaks its whole pool. All jobs that the pool had are then made again by a new one, each by
-itself: the one that ends its process twice gets an outcome that says so, and the others go on together.
+A killed process breaks its whole pool. A new pool then retries all jobs of the broken one, each alone in a process. A
+job that kills its process twice gets an outcome that says so; the others continue together.
 """
 
 from __future__ import annotations
@@ -19,7 +19,8 @@ from mirotwin.campaign.worker import RunOutcome, Work, work
 from mirotwin.campaign.workers import Workers
 
 SPREAD = 4096
-"""Runs between the first one without an outcome and the last one handed over: so many rows wait for their turn."""
+"""Largest distance between the first run without an outcome and the last submitted run, in runs: so many rows may wait.
+"""
 ISOLATED_RETRIES = 2
 """Retries, alone in the executor, of a job that was under way when a worker died: a suspect."""
 MAX_DEAD_EXECUTORS = 20
@@ -34,7 +35,7 @@ def outcomes_of(jobs: Sequence[Work], workers: Workers) -> Iterator[RunOutcome]:
 
 
 class Drive:
-    """Makes runs. `job`: what is handed over for a run."""
+    """Runs jobs through an executor. `job(run)`: the object submitted for a run."""
 
     def __init__(self, job: Callable[[int], Work], workers: Workers) -> None:
         self.job = job
@@ -44,7 +45,7 @@ class Drive:
         self._dead_executors = 0
 
     def outcomes(self, runs: Iterable[int]) -> Generator[RunOutcome]:
-        """Each as soon as it is there. Whoever stops asking, or is interrupted, leaves no job behind."""
+        """Yields each outcome when it is ready. Cancels all jobs when the generator is closed or interrupted."""
         self._runs = iter(runs)
         self._next = next(self._runs, None)
         if self._next is None:
@@ -60,7 +61,7 @@ class Drive:
             self._close()
 
     def _hand_over(self) -> None:
-        """Fills up what is handed over."""
+        """Submits jobs until the queue is full."""
         while (run := self._choose()) is not None:
             try:
                 self._pending[self._executor.submit(work, self.job(run))] = run
@@ -101,7 +102,8 @@ class Drive:
             yield from self._broken(lost)
 
     def _broken(self, lost: list[int]) -> list[RunOutcome]:
-        """A new executor for the jobs of the one that is broken. Outcomes of those that have had all their tries."""
+        """Replaces the broken executor and queues its jobs again. Returns error outcomes of jobs without retries left.
+        """
         lost += self._pending.values()  # a pool that is broken gives no more outcomes, whether done or not
         self._pending.clear()
         self._restart()

@@ -1,4 +1,4 @@
-"""The file of a campaign: which runs it consists of, and what is expected of them; README.md shows one."""
+"""The campaign file: its runs and the expectations on them. README.md shows an example."""
 
 from __future__ import annotations
 
@@ -65,7 +65,7 @@ def load(path: str | Path, settings: Sequence[str] = (), plugins: PluginFiles | 
     """The campaign of a file, or the built-in one of that name, with more `settings` (KEY=VALUE) for all runs.
 
     `plugins`: brought by the command line; one alone is that of all robots, unless a setting or a level names it.
-    Raises BadInput with the place of what is wrong.
+    Raises BadInput with the place of the error.
     """
     path = Path(path)
     if not path.exists() and str(path) in builtin_names():
@@ -90,7 +90,7 @@ def _checked(plan: Plan, settings: Sequence[str], plugins: PluginFiles | None) -
 
 
 def parse(text: str, path: str | Path, settings: Sequence[str] = ()) -> Plan:
-    """The campaign of a text, as if it stood at `path`. Raises BadInput as `load` does."""
+    """The campaign of a text; `path` names it in errors. Raises BadInput as `load` does."""
     return checked(_parsed(text, Path(path)), settings)
 
 
@@ -203,7 +203,7 @@ def _draws(random: Random) -> Iterator[Draw]:
 
 
 def _leaves(table: dict[str, Any], ends: Callable[[Any], bool], above: str = "") -> Iterator[tuple[str, Any]]:
-    """Key paths and what stands there; tables inside tables stand for the parts of a path."""
+    """Yields key path and value of each leaf; nested tables extend the path."""
     for key, value in table.items():
         if ends(value) or not value:
             yield f"{above}{key}", value
@@ -212,6 +212,6 @@ def _leaves(table: dict[str, Any], ends: Callable[[Any], bool], above: str = "")
 
 
 def _of_one_kind(levels: list[Level]) -> tuple[Level, ...]:
-    """Levels whose values share a column: numbers, truth values, or else text."""
+    """Levels with values of one type: all numbers, all truth values, or else all as text."""
     kind = kind_of(level.value for level in levels)
     return tuple(msgspec.structs.replace(level, value=as_kind(level.value, kind)) for level in levels)

@@ -23,7 +23,7 @@ from mirotwin.shell.verdicts import VERDICTS, judge
 
 
 def arm_line(about: ResultsInfo, levels: Mapping[str, Any]) -> str:
-    """`mirotwin run ..` with all that the levels of the factors set; "" for a file that does not say it."""
+    """`mirotwin run ..` with the settings of these factor levels; "" if the file does not record the command."""
     if not about.scenario:
         return ""
     scenario, firmware, settings = about.scenario, about.firmware, list(about.settings)
@@ -47,7 +47,7 @@ MOST_ARMS = 24
 MOST_LEVELS = 6
 MOST_COMPARISONS = 12
 LISTED = 300
-"""Runs that went wrong; the table says how many there are."""
+"""Largest number of failed runs listed; the table gives the total."""
 
 
 def campaign_page(path: Path) -> bytes:
@@ -82,7 +82,7 @@ def campaign_page(path: Path) -> bytes:
 
 
 def _by(rows: ResultRows) -> tuple[str, ...]:
-    """Factors, from the first on, whose combinations fit into the number of arms that a picture can have."""
+    """The first factors whose combinations fit into the largest number of arms of a picture."""
     factors = rows.about.factors
     while factors and len(rows.groups(factors)) > MOST_ARMS:
         factors = factors[:-1]
@@ -145,7 +145,9 @@ def _badge(counts: dict[str, int]) -> tuple[str, str]:
 
 
 def _data(rows: ResultRows) -> bytes:
-    """What composes the command of each row: those of the arms, and for each row its arm, seed and what was drawn."""
+    """JSON from which the page composes the command of each row: commands of arms, and arm, seed and drawn values of
+    each row.
+    """
     factors, about = rows.about.factors, rows.about
     arms = rows.groups(factors)
     drawn = {name: rows.column(name) for name in about.drawn}
@@ -187,8 +189,8 @@ class PageOptions(Options, frozen=True, kw_only=True):
 
 @command_of(PageOptions)
 def page(options: PageOptions) -> int:
-    """Writes one HTML file that needs no network: the spread of each arm, paired differences, what failed, and the
-    command that makes any run again.
+    """Writes one HTML file that needs no network: the spread of each arm, paired differences, failures, and the command
+    that repeats any run.
     """
     place = place_of_page(options.out, options.force, options.results)
     made = campaign_page(Path(options.results))

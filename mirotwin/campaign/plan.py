@@ -1,7 +1,7 @@
 """The plan of a campaign: every run as a job that any worker can do, checked before anything runs.
 
-Each level of each factor, and both ends of each drawn range, are tried once, with the first level of the others: so a
-key that does not exist is found before the first run. A combination that cannot be run is a row with its error.
+Each level of each factor, and both ends of each drawn range, are checked once with the first level of the other
+factors, so an unknown key is reported before the first run. A combination that cannot be run is a row with its error.
 """
 
 from __future__ import annotations
@@ -58,14 +58,12 @@ class Head(msgspec.Struct, frozen=True):
 
 
 class Plan(msgspec.Struct, frozen=True):
-    """A campaign. What its file says: `path` names the file in errors; `settings`: what all runs set, each with the
-    place that says it.
+    """A campaign. From its file: `path`, for errors; `settings` of all runs, each with its place in the file; `values`:
+    the values of a board's parts in the rows, by PART.KEY. `plugins`: from the command line.
 
-    `values`: those of a board's parts that its rows have, by PART.KEY. `plugins`: those that the command line brought.
-
-    What `checked` adds: `scenarios` (whole texts), `images`: by the names and paths that the file uses, that of a board
-    by its scenario; `checks`: names of all checks, in the order in which they are met; `figures`: columns of the rows
-    and their types; `notes`: what settings left out, a line each.
+    Added by `checked`: `scenarios` (whole texts) and `images`, by the names and paths in the file, a board's image by
+    its scenario; `checks`: names of all checks, in order of appearance; `figures`: columns of the rows and their types;
+    `notes`: keys that settings left out, a line each.
     """
 
     path: str
@@ -136,7 +134,7 @@ class Plan(msgspec.Struct, frozen=True):
         )
 
     def varied(self, run: int) -> dict[str, Value]:
-        """The columns of a run that its plan says."""
+        """The varied columns of a run: factors, drawn keys and seed."""
         point = self.design.point(run)
         levels: dict[str, Value] = {
             factor.name: level.value for factor, level in zip(self.design.factors, point.levels, strict=True)
@@ -149,7 +147,7 @@ class Plan(msgspec.Struct, frozen=True):
 
 
 def plan_of_levels(name: str, levels: Sequence[Level], seeds: range, settings: Sequence[str] = ()) -> Plan:
-    """Each level with each seed, outside of any file: `name` stands for it in errors. Each has its scenario."""
+    """A plan without a file: each level with each seed. `name` is used in errors. Each level has its scenario."""
     design = Design(seeds[0], len(seeds), (Factor("case", tuple(levels)),))
     return checked(Plan(name, levels[0].scenario, design), settings)
 
@@ -173,7 +171,7 @@ def checked(plan: Plan, settings: Sequence[str] = ()) -> Plan:
 
 
 def _tried(plan: Plan) -> Plan:
-    """The plan with the names of all checks, and what settings left out. Raises BadInput with the place in the file."""
+    """The plan with the names of all checks and the notes of settings. Raises BadInput with the place in the file."""
     checks: dict[str, None] = {}
     plugins: set[str] = set()
     notes: dict[str, None] = {}
@@ -228,7 +226,9 @@ def _kinds_of_values(world: World, paths: Sequence[str]) -> dict[str, type]:
 
 
 def _tried_points(design: Design) -> Iterator[DesignPoint]:
-    """The first level of all, and each other level and end of a range with the first ones of the others."""
+    """Design points to check: the first level of all factors, then each other level and range end with the others'
+    first.
+    """
     tried: list[Sequence[Any]] = [factor.levels for factor in design.factors]
     tried += [draw.ends() for draw in design.draws]
     points = [[trial[0] for trial in tried]]
@@ -279,7 +279,7 @@ def _images(plan: Plan, texts: Mapping[str, AnyText]) -> dict[str, ImageCopy]:
 
 
 def _named(plan: Plan, default: str, kind: str) -> Iterator[tuple[str, str]]:
-    """Names or paths of scenarios or images, and the place that says each."""
+    """Yields scenario or image (name or path) and its place in the file."""
     yield default, kind
     for factor in plan.design.factors:
         for level in factor.levels:

@@ -25,15 +25,15 @@ ROW = 34
 LINE = 15
 """Height of a line of a label that does not fit into one."""
 WIDEST = 22
-"""Characters of a label in one line, so that a telephone has room for what is drawn."""
+"""Longest line of a label, in characters, so that a telephone has room for the plot."""
 GOLDEN = 0.6180339887498949
 LEAST = {"rms_position_cm": 0.01, "rms_theta_deg": 0.01, "settling_s": 0.05}
-"""The least that an axis spans, by what a metric is shown and known to; of a difference it is LEAST_PERCENT."""
+"""Smallest span of an axis, by the resolution of a metric; for differences it is LEAST_PERCENT."""
 LEAST_PERCENT = 0.1
 
 
 def spread(metric: str, arms: Sequence[tuple[Arm, Numbers]]) -> Any:
-    """A row for each arm that has the metric, over one range; with its numbers, without what a run does not have."""
+    """A row for each arm that has the metric, on one axis, with its numbers; runs without the metric are left out."""
     labels = [wrapped(arm.label) for arm, _ in arms]
     made = _rows(metric, labels)
     _dots(made, [(label, numbers) for label, (_, numbers) in zip(labels, arms, strict=True)])

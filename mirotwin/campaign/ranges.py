@@ -1,4 +1,4 @@
-"""Ranges as people write them: seeds (0-49), and those of the random part of a campaign's file.
+"""Parses ranges: seeds (0-49), and the random part of a campaign's file.
 
 { from = 0.001, to = 0.02 }            all values in between are equally likely
 { from = 1e-6, to = 1e-3, scale = "log" }      equal ratios are
@@ -23,7 +23,7 @@ CHOOSE = "choose"
 
 
 class Range(msgspec.Struct, frozen=True, forbid_unknown_fields=True, rename={"low": "from", "high": "to"}):
-    """Numbers between two ends, drawn as the head of this file says."""
+    """A range between two ends; the head of this file lists its forms."""
 
     low: float
     high: float
@@ -36,7 +36,7 @@ class Choice(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
 
 
 def is_range(value: Any) -> bool:
-    """True if this stands for a range, and not for keys below it."""
+    """True if this table is a range, not a table of further keys."""
     return not isinstance(value, dict) or any(key in value for key in ("from", "to", CHOOSE))
 
 
@@ -64,7 +64,7 @@ _LONGEST = 40
 
 
 def seeds_of(text: str, most: int = MOST_SEEDS) -> range:
-    """First and last seed, both included, `most` at most. ValueError with what is wrong."""
+    """Parses first and last seed, both included, at most `most` seeds. Raises ValueError."""
     first, _, last = text.partition("-")
     last = last or first
     if not (len(text) <= _LONGEST and first.isdecimal() and last.isdecimal()):

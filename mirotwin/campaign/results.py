@@ -1,7 +1,7 @@
 """Results of a campaign as Parquet files: written at the end in the order of the plan, and read again.
 
     noise.parquet            every run: the same bytes whichever processes or machines ran it, in whatever order
-    noise.wall.parquet       `run`, `wall_s`: how long each simulation loop took, which differs from time to time
+    noise.wall.parquet       `run`, `wall_s`: wall time of each simulation loop, not reproducible
 
 pyarrow is loaded when a file is written or read; it comes with the extra `campaign`.
 """
@@ -37,7 +37,7 @@ EACH_ROW = {"run": ("int64",), "seed": ("int64",), "verdict": ("string",)}
 """Columns that no row may lack, with their types."""
 OWN_COLUMNS = frozenset((*OWN, *FIGURES, *BOARD_FIGURES))
 ROWS = 10_000
-"""Rows of a group: what is in memory while a file is written."""
+"""Rows of a row group: the rows in memory while a file is written."""
 META = b"mirotwin_campaign"
 OPTION = "--out"
 
@@ -86,7 +86,7 @@ def about(plan: Plan) -> ResultsInfo:
 
 
 def _elsewhere(level: Level) -> Level:
-    """The level without what is so on this machine only."""
+    """The level without settings that are specific to this machine."""
     names = {"scenario": _name(level.scenario), "firmware": _name(level.firmware)}
     return msgspec.structs.replace(level, place="", **names)
 
@@ -142,7 +142,7 @@ def read_about(path: str | Path) -> ResultsInfo:
 
 @contextmanager
 def _opened(path: str | Path, remedy: str = GIVE) -> Iterator[tuple[pq.ParquetFile, ResultsInfo]]:
-    """Raises BadInput for what cannot be opened, or read within it."""
+    """Opens a Parquet file. Raises BadInput if it cannot be opened or read within the block."""
     require_arrow()
     import pyarrow as pa
     import pyarrow.parquet as pq

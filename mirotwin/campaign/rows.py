@@ -1,7 +1,7 @@
-"""Rows of a results file as columns of numbers: what statistics are made from.
+"""Rows of a results file as columns of numbers, for statistics.
 
-Besides the figures of a run there are shares, 1 for a run of which it is true and 0 for another one: `failed`, `fault`,
-`error`, `unsettled` (not within 3 cm and 0.15 rad for the whole last second), and `check.NAME` (that check failed).
+Besides the figures of a run there are shares (1 true, 0 false for a run): `failed`, `fault`, `error`, `unsettled` (not
+within 3 cm and 0.15 rad for the whole last second), and `check.NAME` (that check failed).
 """
 
 from __future__ import annotations
@@ -20,7 +20,7 @@ from mirotwin.campaign.results import read
 from mirotwin.campaign.statistics import Figures, Numbers, Seeds, figures
 
 SHARES = ("failed", "fault", "error")
-"""Verdicts whose share is a figure."""
+"""Verdicts whose shares are metrics."""
 UNSETTLED = "unsettled"
 SETTLING = "settling_s"
 EVERYONE = "all runs"
@@ -29,7 +29,7 @@ NOT_FIGURES = ("settled",)
 
 
 class Arm(msgspec.Struct, frozen=True):
-    """Runs with the same levels of some factors. `never_settled`: so many end outside and have no `settling_s`."""
+    """Runs with the same levels of some factors. `never_settled`: runs that end outside and have no `settling_s`."""
 
     factors: dict[str, Value]
     runs: int
@@ -42,7 +42,8 @@ class Arm(msgspec.Struct, frozen=True):
         return label_of(self.factors)
 
     def metric_label(self, name: str) -> str:
-        """The metric, and what its median leaves out: runs that never settle have no time at which they did."""
+        """The metric's label with the runs that its median leaves out: a run that never settles has no settling time.
+        """
         if name == SETTLING and self.never_settled:
             return f"{name} ({self.never_settled} of {self.runs} never settle)"
         return name
@@ -67,7 +68,7 @@ class ResultRows:
 
     @property
     def varied(self) -> tuple[str, ...]:
-        """Columns that say which run a row is, but for the seed."""
+        """Columns that identify a row, without the seed."""
         return (*self.about.factors, *self.about.drawn)
 
     @property
@@ -76,7 +77,7 @@ class ResultRows:
         return "to_board" in self.table.column_names
 
     def metrics(self) -> list[str]:
-        """All that `numbers` knows; results of another version may have fewer."""
+        """All names that `numbers` accepts; results of another version may have fewer."""
         others = {*OWN, *self.varied, *NOT_FIGURES, *(CHECK + name for name in self.about.checks)}
         figures = [
             field.name
@@ -102,7 +103,7 @@ class ResultRows:
         return values
 
     def numbers(self, name: str) -> Numbers:
-        """One for each row; NaN where a run does not have it."""
+        """One number for each row; NaN for a run without it."""
         if name in SHARES:
             values = [verdict == name for verdict in self.column("verdict")]
         elif name == UNSETTLED:
@@ -117,7 +118,7 @@ class ResultRows:
             raise BadInput(self.path, name, "holds no numbers", "run the campaign again") from None
 
     def samples(self) -> Seeds:
-        """Which rows stand together as one sample: those of a seed; with a single seed, those of a draw."""
+        """The sample of each row: its seed; with a single seed, its draw."""
         seeds = np.array(self.column("seed"), dtype=np.int64)
         if "draw" in self.table.column_names and len(np.unique(seeds)) == 1:
             return np.array(self.column("draw"), dtype=np.int64)

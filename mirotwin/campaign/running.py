@@ -1,4 +1,4 @@
-"""Runs a campaign: from its plan to the results file, taking up what an earlier process has left."""
+"""Runs a campaign from its plan to the results file, and resumes one that an earlier process left unfinished."""
 
 from __future__ import annotations
 
@@ -23,7 +23,7 @@ MANY_RUNS = 100_000
 
 
 class Tally(msgspec.Struct):
-    """How many of `runs` have an outcome (`done`), and how many of those come from this process (`new`)."""
+    """Progress: how many of `runs` have an outcome (`done`), and how many of these this process computed (`new`)."""
 
     done: int = 0
     runs: int = 0
@@ -46,12 +46,12 @@ def run(
     many: bool = False,
     on_outcome: Callable[[Tally, RunOutcome], object] = lambda tally, outcome: None,
 ) -> Tally:
-    """Makes all runs that `results` lacks, and writes it.
+    """Runs everything that `results` lacks, and writes the file.
 
-    `executor`: any of `concurrent.futures`, which stays open; without one, a process for each core. Results that are
-    there already are those of the same campaign, and are left as they are, or BadInput is raised; with `force` they are
-    made again. `many`: more than 100 000 runs are meant. Interrupted, it goes on when it is called again. A script
-    calls it below `if __name__ == "__main__":`: the processes import the script, and BadInput is raised otherwise.
+    `executor`: any of `concurrent.futures`, which stays open; without one, a process for each core. Complete results of
+    the same campaign are left unchanged; results of another one raise BadInput; `force` runs them again. `many`: allow
+    more than 100 000 runs. After an interruption, call it again to resume. A script calls it below `if __name__ ==
+    "__main__":`: the processes import the script, and BadInput is raised otherwise.
     """
     refuse_in_import()
     path = Path(results)

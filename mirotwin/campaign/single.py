@@ -58,7 +58,7 @@ def image_of(firmware: ImageCopy) -> Image:
 
 
 def run_single(job: Work) -> RunOutcome:
-    """Runs it to the end; whatever goes wrong becomes the outcome's error."""
+    """Runs a job to its end; any exception becomes the outcome's error."""
     try:
         return _run(job)
     except BadInput as error:
@@ -110,7 +110,7 @@ def _run(job: Work) -> RunOutcome:
 
 
 def step_times(run: Run) -> dict[str, float]:
-    """How long each wait took that was fulfilled, by its column."""
+    """Column -> duration of each wait that was fulfilled."""
     player = run.player
     took = zip(player.steps, player.took_ticks, strict=False) if player else ()
     return {
@@ -121,7 +121,7 @@ def step_times(run: Run) -> dict[str, float]:
 
 
 def _failure(run: Run, result: Result) -> str:
-    """The step or the first check that failed, else what was not judged."""
+    """The failed step or first failed check, else the check that was not judged."""
     if run.player is not None and run.player.failure is not None:
         return f"step: {run.player.failure}"
     if result.failures:

@@ -1,14 +1,13 @@
-"""Numbers that stand for many runs: quantiles, means, and how far another set of seeds could move them.
+"""Statistics of many runs: quantiles, means, and their confidence intervals over seeds.
 
-Runs with the same seed share its calibration, its wheels and its noise, so they are not independent: a sample is a
-seed with all its runs. The interval of a mean is Student's, with the variance between seeds (Liang and Zeger,
-"Longitudinal data analysis using generalized linear models", Biometrika 73, 1986, doi:10.1093/biomet/73.1.13) and one
-degree of freedom less than there are seeds. The interval of a median is a percentile bootstrap (Efron, "Bootstrap
-methods: another look at the jackknife", Annals of Statistics 7, 1979, doi:10.1214/aos/1176344552): the median of 2000
-sets of as many seeds, drawn with replacement, and the middle of what comes out: 95 % of it for many seeds, more for few
-(Hesterberg, "What teachers should know about the bootstrap", The American Statistician 69, 2015,
-doi:10.1080/00031305.2015.1089789: the expanded percentile interval). How often such intervals hold what they should:
-`python -m benchmarks.intervals`.
+Runs with the same seed share its calibration, its wheels and its noise, so they are not independent: a sample is a seed
+with all its runs. The interval of a mean is Student's, with the variance between seeds (Liang and Zeger, "Longitudinal
+data analysis using generalized linear models", Biometrika 73, 1986, doi:10.1093/biomet/73.1.13) and one degree of
+freedom less than there are seeds. The interval of a median is a percentile bootstrap (Efron, "Bootstrap methods:
+another look at the jackknife", Annals of Statistics 7, 1979, doi:10.1214/aos/1176344552): the medians of 2000 sets of
+equally many seeds, drawn with replacement, and their middle part: 95 % for many seeds, more for few (Hesterberg, "What
+teachers should know about the bootstrap", The American Statistician 69, 2015, doi:10.1080/00031305.2015.1089789: the
+expanded percentile interval). `python -m benchmarks.intervals` measures the coverage of these intervals.
 
 The interval of a median of paired differences needs no draws: it is between two of the differences in order, whose
 ranks are binomial (Thompson, "On confidence ranges for the median and other expectation distributions", Annals of
@@ -16,11 +15,9 @@ Mathematical Statistics 7, 1936, doi:10.1214/aoms/1177732502). It is exact for a
 0 is outside of it where the sign test says so (Dixon and Mood, "The statistical sign test", Journal of the American
 Statistical Association 41, 1946, doi:10.1080/01621459.1946.10501898).
 
-The interval of a mean does not hold where a few runs are far from all others: one that has none of the runaways in it
-does not know of them. `python -m benchmarks.intervals` has the figures; medians and counts of higher and lower do hold.
-
-The draws are those of a stream of `miro_exact.rng`, and sums are made in a written order: the same rows give the same
-digits everywhere.
+The interval of a mean is wrong where a few runs are far from all others: a sample without such runaways gives no hint
+of them. `python -m benchmarks.intervals` has the figures; medians and counts of higher and lower are valid. Draws come
+from a stream of `miro_exact.rng`, and sums have a fixed order: the same rows give the same digits everywhere.
 """
 
 from __future__ import annotations
@@ -92,8 +89,8 @@ def draws(size: int, count: int = RESAMPLES) -> Iterator[npt.NDArray[np.int64]]:
 
 
 def sign_test(lower: int, higher: int) -> float:
-    """How likely chance alone splits so many pairs at least as unevenly, either way; pairs without a difference do not
-    count.
+    """Two-sided probability that chance alone splits these pairs at least as unevenly; pairs without a difference do
+    not count.
     """
     count = lower + higher
     tail = sum(math.comb(count, fewer) for fewer in range(min(lower, higher) + 1))

@@ -1,4 +1,6 @@
-"""What a run's bits depend on besides its job: this program's version and sources, and parts of other distributions."""
+"""The versions on which a run's bits depend besides its job: this program's version and sources, and parts of other
+distributions.
+"""
 
 from __future__ import annotations
 
@@ -30,7 +32,7 @@ class Versions(msgspec.Struct, frozen=True):
     parts: tuple[str, ...] = ()
 
     def difference(self, other: Versions) -> str:
-        """The difference of `other` to this in words; "" where nothing differs."""
+        """The differences of `other` from this, in words; "" if there is none."""
         if self.mirotwin != other.mirotwin:
             return f"mirotwin {other.mirotwin} instead of {self.mirotwin}"
         if self.code != other.code:

@@ -45,7 +45,7 @@ from mirotwin.verify.expectations import as_settings, in_files
 from mirotwin.verify.steps.reading import steps_in
 
 COARSE = 8
-"""Pieces of the run up to the failure, between which the search begins."""
+"""Intervals into which the run up to the failure is first divided."""
 MOST_POINTS = COARSE + 24
 PAGE, FAILS, PASSES = "why.html", "fails.stream", "passes.stream"
 
@@ -71,14 +71,14 @@ class WhyOptions(CaseOptions, frozen=True, kw_only=True):
 def why(options: WhyOptions) -> int:
     """Finds the control period in which a run's failure became inevitable.
 
-    RUN is a scenario with --seed, a recording or a case that fails a check (its own, or one of --expect) or a step.
-    At moments of the run the noise is replaced by that of other seeds, and the branches that fail are counted; wheels
-    and calibration stay. The search halves the distance in which their share passes one half, down to one control
-    period. What happened in that period decided; `mirotwin debug` stands at its begin.
+    RUN is a scenario with --seed, a recording or a case that fails a check (its own, or one of --expect) or a step. At
+    several moments of the run the noise is replaced by the noise of other seeds, and the failed branches are counted;
+    wheels and calibration stay the same. The search halves the interval in which their share passes one half, down to
+    one control period. That period decided the failure; `mirotwin debug` opens at its begin.
 
     The folder gets a page with the curve, and a branch that fails and one that does not, as stream files.
 
-    Exit code 0, whatever is found; 2: the run does not fail.
+    Exit code 0: done, with any result; 2: the run does not fail.
     """
     options.plugins.bring()
     spec = _spec(options)
@@ -155,7 +155,7 @@ def _spec(options: WhyOptions) -> RunSpec:
 
 
 def _failed(run: Run, options: WhyOptions) -> tuple[str, int]:
-    """The name of what failed first, and its tick. Raises BadInput."""
+    """Name and tick of the first failure. Raises BadInput if there is none."""
     failure, player = failure_of(run), run.player
     if player is not None and player.failure is not None:
         return STEP, player.failure.tick
@@ -186,7 +186,7 @@ def _two_branches(spec: RunSpec, name: str, curve: Curve, seeds: list[int]) -> d
 
 
 def _lines(options: WhyOptions, curve: Curve, spec: RunSpec, streams: list[Path], place: str) -> list[str]:
-    """The commands that play the branches again, and that stand at the jump."""
+    """The commands that replay the branches and open the debugger at the jump."""
     checks, image = tuple(in_files(options.expected).values()), foreign_path(spec.image)
     lines = [replay_line(path, image, checks, options.plugins) for path in streams]
     same = {name: getattr(options, name) for name in ("file", "seed", "settings", "firmware", "plugins")}

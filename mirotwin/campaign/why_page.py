@@ -18,9 +18,9 @@ COLUMNS = ("at", "fail", "of", "share", "95 % interval")
 
 
 class Curve(msgspec.Struct, frozen=True, kw_only=True):
-    """How likely `run` fails from each of the `points` on. `what`: the failure. `low`: the index of the control period
-    in which failing became more likely than not, -1 if it was so from the start. `others`: runs of other seeds, so of
-    robots with other wheels and another calibration. `clock`: ticks a second.
+    """The failure rate of `run`'s branches at each of the `points`. `what`: name of the failure. `low`: index of the
+    control period in which the rate passes one half, -1 if it is above one half from the start. `others`: runs of other
+    seeds, with other wheels and another calibration. `clock`: ticks per second.
     """
 
     run: str
@@ -33,14 +33,14 @@ class Curve(msgspec.Struct, frozen=True, kw_only=True):
 
     @property
     def jump_tick(self) -> int:
-        """The begin of that control period."""
+        """First tick of the control period `low`."""
         return max(self.low, 0) * self.period
 
     def at(self, tick: int) -> Point:
         return next(point for point in self.points if point.tick == tick)
 
     def lines(self) -> list[str]:
-        """What was found."""
+        """The results, in lines of text."""
         first, others, clock = self.points[0], self.others, self.clock
         start = f"other noise from the start: {_of(first)} fail; {OTHERS} (other seeds): {_of(others)}"
         if self.low < 0:

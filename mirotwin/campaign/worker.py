@@ -1,4 +1,4 @@
-"""What a worker gets, does and gives back, wherever it runs: in this process, in another one, on another machine.
+"""A worker's job and its outcome. Workers run in this process, in another one, or on another machine.
 
 Nothing here imports a hot module: a new process reads this file before its engine is chosen.
 """
@@ -19,7 +19,7 @@ Figure = float | int | bool | str | None
 
 
 class ImageCopy(msgspec.Struct, frozen=True):
-    """An image that needs no file: the content of one, and where its names are, as JSON. `path` is for messages."""
+    """An image without its file: the content, and the addresses of its names as JSON. `path` is for messages."""
 
     path: str
     sha256: str
@@ -28,10 +28,9 @@ class ImageCopy(msgspec.Struct, frozen=True):
 
 
 class Work(msgspec.Struct, frozen=True):
-    """One run: a whole scenario as text, `settings` to make in it, and a seed. `run`: its number in the plan.
-
-    `values`: the values of parts that its row has, and their types. `recording`: the file for a recording, if it is
-    recorded. `brought`: files with plug-ins, by the fields of `mirotwin.shell.plugin_files.PluginFiles`.
+    """One run: a whole scenario as text, `settings` to make in it, and a seed. `run`: its number in the plan. `values`:
+    the values of parts in its row, and their types. `recording`: path of the recording, if there is one. `brought`:
+    plug-in files, by the fields of `mirotwin.shell.plugin_files.PluginFiles`.
     """
 
     run: int
@@ -48,11 +47,10 @@ class Work(msgspec.Struct, frozen=True):
 
 
 class RunOutcome(msgspec.Struct, frozen=True, omit_defaults=True):
-    """The result of a run. `verdict`: passed, failed (a check or a step), not judged (a check that is named had no
-    occasion), fault (of the firmware) or error (no run).
-
-    `error`: why there are no figures; `traceback`: that of a plug-in's error, where it is wanted. `failure`: the first
-    check or step that failed, or what was not judged. `checks`: name -> verdict. `wall_s`: the simulation loop.
+    """The result of a run. `verdict`: passed, failed (a check or a step), not judged (a named check never applied),
+    fault (of the firmware) or error (no run). `error`: why there are no figures; `traceback`: of a plug-in's error, if
+    requested. `failure`: the first failed check or step, or the check that was not judged. `checks`: name -> verdict.
+    `wall_s`: the simulation loop.
     """
 
     run: int
@@ -67,7 +65,10 @@ class RunOutcome(msgspec.Struct, frozen=True, omit_defaults=True):
 
 
 def work(job: Work) -> RunOutcome:
-    """Runs a job to its end, whatever happens to the run. Raises BadInput where this process is not as the job's."""
+    """Runs a job to its end and catches its errors.
+
+    Raises BadInput if this process has other versions than the job requires.
+    """
     difference = _engine(job.engine)
     if not difference:
         _bring(tuple(job.brought.items()))

@@ -1,4 +1,4 @@
-"""The rules that a firmware on its way is known not to keep: the file of `conform --baseline`, a line a rule for git.
+"""The file of `conform --baseline`: rules that unfinished firmware is known to fail, one line a rule, kept in git.
 
 # Rules that this firmware is known not to keep yet: mirotwin conform IMAGE --baseline known.toml
 P42 = "no telemetry yet"
@@ -22,7 +22,7 @@ _HEAD = "# Rules that this firmware is known not to keep yet: mirotwin conform I
 
 
 def read(path: Path, may_be_new: bool = False) -> dict[str, str]:
-    """Rule -> why it is known to fail. Raises BadInput; for a file that is not there unless it `may_be_new`."""
+    """Rule -> reason why it is known to fail. Raises BadInput; for a missing file only if not `may_be_new`."""
     try:
         text = decode(read_input(path))
     except FileNotFoundError:
@@ -42,7 +42,8 @@ def read(path: Path, may_be_new: bool = False) -> dict[str, str]:
 
 
 def write(path: Path, known: Mapping[str, str], outcomes: Sequence[Outcome]) -> dict[str, str]:
-    """Writes the rules that failed, and those of `known` that were not judged; returns them. Reasons in `known` stay.
+    """Writes the rules that failed, and those of `known` that were not judged, with the reasons from `known`; returns
+    them.
 
     Raises OutputError.
     """

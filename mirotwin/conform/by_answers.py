@@ -1,9 +1,9 @@
-"""The rules that answers can show, tried on a robot at a port: what a PC can send and receive, and nothing else.
+"""Tries rules on a robot at a port, where only sent and received characters can be observed.
 
-A rule is seen in what the robot answers, and in how many frames it has accepted by the end of the trial. What a PC
-cannot send is left out of a trial, where that changes nothing else: bad stop bits, and pauses within a frame that are
-shorter than it can time. A trial that fails is tried again: noise may have spoilt it. A rule fails where each trial
-failed, and in one of them characters came in time; where they never did, it is not judged.
+A rule is judged by the robot's answers and by its count of accepted frames at the end of the trial. Parts of a trial
+that a PC cannot send (bad stop bits, pauses within a frame shorter than it can time) are left out if nothing else
+depends on them. A failed trial is repeated, because noise may have spoilt it. A rule fails if every trial failed and
+the characters of at least one came in time; if they never did, the rule is not judged.
 """
 
 from __future__ import annotations
@@ -47,11 +47,15 @@ NOT_OBSERVABLE = {id: why for why, ids in _REASONS.items() for id in ids.split()
 SHORTEST_US = 5000.0
 """A pause that a PC can make within a frame."""
 SURE_TICKS = 5 * TICKS_PER_MS
-"""Characters that come and go so much later than others still say what a trial wants to know. Chosen: half of what a
-robot has to act in, a quarter of the shortest margin of the silences."""
+"""Timing uncertainty up to which a trial is judged.
+
+Chosen: half of the time in which a robot must act, a quarter of the shortest margin of the silences.
+"""
 ANSWERED_TICKS = 24 * TICKS_PER_MS
-"""From the end of a question to the end of its answer, with key-up, by the shipped firmware. What the quickest answer
-takes longer is the way: adapters of USB keep characters."""
+"""From the end of a question to the end of its answer, with key-up, by the shipped firmware.
+
+The extra time of the quickest answer is the delay of the path: USB adapters hold characters back.
+"""
 TRIES = 4
 NOISY = {"P49": 16}
 """More tries: noise between the frames of a keyed radio makes robots count windows in which no frame was sent."""
@@ -87,9 +91,9 @@ class PortScript(TrialScript):
 def try_at_port(
     rules: Sequence[Rule], desk: DeskOptions, note: Note, everything: bool = False
 ) -> Iterator[Outcome]:
-    """Outcomes, each as soon as it is known. `note` gets notes; `everything`: as of `in_order`.
+    """Yields each outcome when it is known. `note` gets notes; `everything`: as of `in_order`.
 
-    Raises BadInput where no robot answers, PortError.
+    Raises BadInput if no robot answers, PortError.
     """
     with RobotPort(desk, trial_of(rules[0]).scenario, note=note) as port:
         topology = Topology(port.greet(ROBOT_COUNTS), port.slots[:1])
@@ -106,7 +110,9 @@ def try_at_port(
 
 
 def _try_often(rule: Rule, port: RobotPort, topology: Topology) -> Outcome:
-    """Noise, or a character that came late, may spoil a trial: who breaks a rule fails each of them."""
+    """Tries a rule several times: noise or late characters may spoil a trial, but a robot that breaks the rule fails
+    each.
+    """
     sure: tuple[Failure, ...] = ()
     for _ in range(NOISY.get(rule.id, TRIES)):
         try:
@@ -127,7 +133,7 @@ def _try_often(rule: Rule, port: RobotPort, topology: Topology) -> Outcome:
 
 
 def _try(rule: Rule, port: RobotPort, topology: Topology) -> tuple[Failure | None, int]:
-    """The failure, if any, and how well the times of the trial are known."""
+    """The failure, if any, and the uncertainty of the trial's times in ticks."""
     slot = topology.slots[0]
     script = PortScript(topology, standing=not port.guard.desk.allow_motion)
     rule.write(script)

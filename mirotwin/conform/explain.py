@@ -1,4 +1,5 @@
-"""The timeline of a rule's trial: what was sent, received, commanded and answered, and what was wanted when."""
+"""The timeline of a rule's trial: frames sent and received, commands, answers, and the expectations with their ticks.
+"""
 
 from __future__ import annotations
 
@@ -23,7 +24,7 @@ from mirotwin.conform.trial_script import TrialExpectation
 from mirotwin.verify.checks.orders import Orders
 
 Row = tuple[int, str, str]
-"""Tick, what, and details."""
+"""Tick, label, and details."""
 _STT = BY_NAME["STT"].opcode
 
 
@@ -63,7 +64,7 @@ def _collapsed(rows: list[Row]) -> Iterator[Row]:
 
 
 def _verdict(expected: TrialExpectation, observed: Observed) -> Row:
-    """An expectation that failed stands where it failed, one that was fulfilled where it was over."""
+    """The row of an expectation: at the tick of its failure, or at the tick at which it was fulfilled."""
     failure = expected.found(observed)
     if failure is None:
         return expected.tick, "passed", expected.wanted

@@ -1,4 +1,4 @@
-"""What a robot does instead, in words, where one usual mistake explains all that it does."""
+"""Describes the robot's wrong reaction in words, if one usual mistake explains all of it."""
 
 from __future__ import annotations
 
@@ -43,7 +43,7 @@ def payload_of(words: Iterable[Pair]) -> bytes:
 
 
 def wheels_instead(orders: Sequence[Order], frame: Frame, slot: int) -> str:
-    """The one mistake that makes both orders of this frame; or ""."""
+    """Names the one mistake that explains both orders after this frame; "" if none does."""
     velocities = (orders[0].velocity, orders[1].velocity)
     left, right = frame.for_robot(slot)
     wanted = (left << 8, right << 8)

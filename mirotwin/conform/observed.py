@@ -1,7 +1,7 @@
-"""What was observed of one robot in a trial, at its wires and chips: nothing here knows a symbol of the firmware.
+"""Observations of one robot in a trial, at its wires and chips. No symbol of the firmware is used.
 
-An order to a wheel is a command to its LM629; an answer of the robot is what the PC received; the state of the chips is
-read at the start of each control period.
+An order to a wheel is a command to its LM629. An answer is the frame that the PC received. The chips are read at the
+start of each control period.
 """
 
 from __future__ import annotations
@@ -34,7 +34,7 @@ def within(items: Iterable[T], after_tick: int, until_tick: int) -> list[T]:
 
 
 class ReceivedAnswer(msgspec.Struct, frozen=True):
-    """A valid answer that the PC had received whole at `tick`. `content`: None where that is not known."""
+    """A valid answer, received completely by the PC at `tick`. `content`: None if it is not known."""
 
     tick: int
     frame: Received
@@ -85,7 +85,7 @@ class Observed:
         del self.received[start : start + len(data)]
 
     def take_period(self, tick: int, record: RobotPeriod, board: Board) -> None:
-        """The robot as it was at the start of a control period, and its board as it is now."""
+        """Adds the robot's record at the start of a control period, and the present state of its board."""
         self.periods.append((tick, record))
         self.samples.append((tick, board.left.sample_tick, board.right.sample_tick))
 

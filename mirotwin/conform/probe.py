@@ -1,4 +1,4 @@
-"""What a robot does that obeys no plain team frame: found out by a trial of its own."""
+"""Runs an extra trial to find out how a robot that obeys no plain team frame reacts instead."""
 
 from __future__ import annotations
 
@@ -24,7 +24,7 @@ Listener = ObservingMonitor[Check]
 
 
 class Listening(Check, frozen=True, kw_only=True, tag="listening"):
-    """Expects nothing."""
+    """A check without expectations; it only listens."""
 
     KIND = "safety"
 
@@ -33,7 +33,7 @@ class Listening(Check, frozen=True, kw_only=True, tag="listening"):
 
 
 def listen(trial: Trial, image: Image, seed: int) -> list[Listener]:
-    """A listener for each robot of the trial, which is run to its end."""
+    """Runs the trial to its end; returns a listener for each of its robots."""
     monitors = run_trial(trial, Listening(), image, seed).checks.monitors
     return [monitor for monitor in monitors if isinstance(monitor, ObservingMonitor)]
 
@@ -45,7 +45,8 @@ _UNHEARD = 4
 
 
 def why_deaf(network: int, image: Image, seed: int) -> str:
-    """How the robot in this topology of `BOTH` reacts instead of obeying plain frames, or ""."""
+    """The reaction of the robot in this topology of `BOTH`, if it does not obey plain frames; "" if none is recognised.
+    """
     topology = BOTH[network]
     tried: list[tuple[str, Frame]] = []
 
@@ -74,7 +75,7 @@ def why_deaf(network: int, image: Image, seed: int) -> str:
 
 
 def _other_layout(script: TrialScript) -> TrialScript:
-    """A script that goes on where `script` stands, and sends frames for a network of the other size."""
+    """A script that continues at the end of `script` with frames for a network of the other size."""
     other = TrialScript(next(topology for topology in BOTH if topology.robots != script.n), script.network)
     other.topology = Topology(other.n, script.topology.slots)
     other.now, other.seq = script.now, script.seq

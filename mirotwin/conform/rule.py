@@ -35,8 +35,8 @@ class Topology(msgspec.Struct, frozen=True):
     """A network of `robots` slots with a robot in each of `slots`, and a radio without errors.
 
     `keyed`: the carrier is on for frames only and the receiver hears noise in between; else it is on all the time.
-    `baud_offset_ppm`: so much faster is the host's serial port. `strap`: what the slot pins of its robots say, if not
-    their slots.
+    `baud_offset_ppm`: speed error of the host's serial port, positive is faster. `strap`: value on the slot pins of its
+    robots, if not their slots.
     """
 
     robots: int = 3
@@ -49,19 +49,19 @@ class Topology(msgspec.Struct, frozen=True):
 BOTH = (Topology(3, (1,)), Topology(5, (3,)))
 """A robot in either layout."""
 THREE = (Topology(3, (1,)),)
-"""One robot, where the layout does not matter."""
+"""One robot, for rules that do not depend on the layout."""
 
 
 class Rule(msgspec.Struct, frozen=True):
     """`source` is the page and section that it comes from.
 
-    `write` writes the trial: what the host of a network sends, and what its robots have to make of it. It is called
-    for each of `topologies`; its name is the rule's, and its docstring the rule, a sentence with MUST.
+    `write` writes the trial: the frames of a network's host and the required reactions of its robots. It is called for
+    each of `topologies`. Its name is the rule's name, and its docstring is the rule, a sentence with MUST.
 
     `faults`: kinds of firmware fault that break this rule, in its own trial and in those of others. `lm629`: the chips
-    of its robots. `presupposes`: ids of rules without which its trial says nothing about its own sentence; where one of
-    them failed, this one is not judged. `broken`: what firmware does that breaks it, for rules that others presuppose.
-    `probe` finds out more about such firmware, in the network that is given; it may find nothing, "".
+    of its robots. `presupposes`: ids of rules that its trial depends on; if one of them failed, this rule is not
+    judged. `broken`: the behaviour of firmware that breaks it, in words, for rules that others presuppose. `probe`:
+    examines such firmware in the given network; returns a text, or "".
     """
 
     id: str

@@ -1,8 +1,7 @@
-"""The check `conforms_to`: whether a robot keeps a rule, in the trial of that rule.
+"""The check `conforms_to`: the robot keeps a rule, in the trial of that rule.
 
-The monitor keeps what it is told and judges at the end, each expectation by itself, but those that are over later than
-the run. In a run in which the hosts say anything else than in the rule's trial nothing is judged: the check is for
-trials alone.
+The monitor records events and judges each expectation at the end, except those that end after the run. If a host
+departs from the script of the rule's trial, nothing is judged: the check is for trials only.
 """
 
 from __future__ import annotations

@@ -1,12 +1,13 @@
-"""Tries rules on an image: a world for each rule, run to the end of its trial.
+"""Tries rules on an image: one world for each rule, run to the end of its trial.
 
-Every trial ends at a tick that is known in advance, whatever the firmware does: one that never boots or sends without
-end costs the same virtual time. Trials go on after a firmware fault, but end after a thousand. Faults break the rules
-about them, whichever trial they came in.
+Every trial ends at a tick that is known in advance, so firmware that never boots or sends endlessly costs the same
+virtual time. A trial continues after a firmware fault and ends after a thousand. A fault in any trial breaks the rules
+about faults.
 
-A second process tries every second rule, where Linux has a core for it. A trial depends on its rule, the image and the
+On Linux with a second core, a second process tries every second rule. A trial depends on its rule, the image and the
 seed alone, so the verdicts are those of one process, and they come in the same order. The second process does not know
-what fails in the first: it tries rules that are then not judged, too. If it is killed, the first tries the rest.
+the failures of the first, so it also tries rules that are then not judged. If it is killed, the first process tries the
+rest.
 """
 
 from __future__ import annotations
@@ -41,9 +42,9 @@ FAULTS_KEPT = 20
 class Outcome(msgspec.Struct, frozen=True):
     """The result of a rule. `failures`: in the order of time, the first hundred. `faults`: (network, slot, fault) of
     its trial, the first twenty a robot; `fault_count` of all. `cases`: name and text of a file for each failure.
-    `cause`: the rule is not judged, because this one failed. `hint`: what the firmware does instead, if that is known.
-    At a port, `unseen`: why answers do not show it; `unsure`: why it is not judged. `sent`: the stream of a trial that
-    the sanitizer watched.
+    `cause`: the failed rule because of which this one is not judged. `hint`: the firmware's wrong behaviour in words,
+    if it is recognised. At a port, `unseen`: why answers cannot show it; `unsure`: why it is not judged. `sent`: the
+    stream of a trial that the sanitizer watched.
     """
 
     rule: str
@@ -78,12 +79,13 @@ def failure_text(failure: Failure) -> str:
 
 
 def case_names(rule: Rule) -> tuple[str, str, str]:
-    """Files that a rule may leave: its own failure, a firmware fault in its trial, and what the sanitizer watched."""
+    """Names of the files that a rule may leave: its failure, a firmware fault in its trial, and the sanitizer's trial.
+    """
     return f"{rule.id}{SUFFIX}", f"{rule.id}-fault{SUFFIX}", f"{rule.id}-sanitized{SUFFIX}"
 
 
 def try_rule(rule: Rule, image: Image, seed: int = 0, keep: bool = False) -> Outcome:
-    """Runs the rule's trial on `image`; with `keep`, what failed is there as cases."""
+    """Runs the rule's trial on `image`; with `keep`, the outcome contains its failures as cases."""
     run = run_trial(trial_of(rule), ConformsTo(rule=rule.id), image, seed)
     world = run.world
     failures = [failure for failure in run.failures if not failure.fault]
@@ -138,10 +140,9 @@ def try_all(
     ahead: bool = False,
     everything: bool = False,
 ) -> Iterator[Outcome]:
-    """Each as soon as it is known, those that others presuppose first; see `with_faults`. `ahead`: by two processes.
-
-    A rule is not judged where one of `rules` failed that it presupposes: then its trial is not run, unless `everything`
-    is tried.
+    """Yields each outcome when it is known, presupposed rules first; see `with_faults`. `ahead`: use two processes. A
+    rule is not judged if a rule of `rules` that it presupposes failed; its trial is then not run, unless `everything`
+    is set.
     """
     forbidden = {kind: rule.id for rule in rules for kind in rule.faults}
     tried = partial(_try_and_explain, image=image, seed=seed, keep=keep, forbidden=forbidden)
@@ -164,8 +165,10 @@ def try_all(
 
 
 _copied: dict[str, Callable[[Rule], Outcome]] = {}
-"""What the copied process tries rules with. A job that holds the image is more than a pipe takes: where the process is
-killed, the thread that writes the job would wait for ever (issue 94777 of CPython, before 3.12).
+"""The functions that try a rule in the copied process.
+
+A job with the image would not fit into a pipe: if the process were killed, the thread that writes the job would wait
+for ever (issue 94777 of CPython, before 3.12).
 """
 
 
@@ -178,8 +181,8 @@ def _try_and_explain(
 ) -> Outcome:
     """The outcome of a rule, with a hint if it failed.
 
-    It is not judged where the firmware did, before it failed, what another rule forbids (`forbidden`: kind of fault ->
-    rule): what comes after that says nothing of the rule.
+    The rule is not judged if the firmware first did something that another rule forbids (`forbidden`: kind of fault ->
+    rule): the behaviour after such a fault proves nothing about this rule.
     """
     outcome = try_rule(rule, image, seed, keep)
     if not outcome.failures:
@@ -212,7 +215,9 @@ def in_order(
 
 
 def with_faults(outcomes: Sequence[Outcome], rules: Sequence[Rule]) -> list[Outcome]:
-    """The outcomes in the order of `rules`, with all trials' firmware faults held against those that forbid them."""
+    """The outcomes in the order of `rules`; the firmware faults of all trials become failures of the rules that forbid
+    them.
+    """
     by_id = {outcome.rule: outcome for outcome in outcomes}
     judged = []
     for rule in rules:

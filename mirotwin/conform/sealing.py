@@ -73,7 +73,7 @@ _CRC: dict[str, dict[object, str]] = {
     "layout": {None: "", -1: "no layout byte"},
     "high_first": {False: "", True: "high byte sent first"},
 }
-"""The usual mistakes in a CRC: a field of `Sealing`, and what each of its values is called."""
+"""Usual mistakes in a CRC: a field of `Sealing`, and a name for each wrong value."""
 
 
 def _checks() -> Iterator[tuple[str, Sealing]]:
@@ -111,12 +111,14 @@ MISTAKES = {
     "a CRC that is not whitened": Sealing(plain_crc=True),
     **dict(_checks()),
 }
-"""By what such a frame has, in words that follow `a frame with ..`. Whitening first: a robot that takes a wrong HDR for
-good refuses the numbers that follow."""
+"""Mistake, in words that follow `a frame with ..`, -> how to seal such a frame.
+
+Whitening first: a robot that accepts a wrong HDR refuses the following numbers.
+"""
 
 
 def mistake_in(form: Format, characters: bytes, begins: int) -> str:
-    """The mistake with which these characters, from the sync on, are a frame whose HDR is `begins`; or ""."""
+    """The mistake with which these characters, from the sync on, are a frame with the HDR `begins`; "" if none fits."""
     for mistake, sealing in MISTAKES.items():
         body = sealing.opened(form, characters)
         if body is not None and body[0] == begins:

@@ -1,7 +1,7 @@
-"""A rule's trial: the world in which it is tried, what is sent in it, and what is expected.
+"""A rule's trial: its world, the frames sent, and the expectations.
 
-Robots stand far apart; the radio has no errors; the camera sees nothing, because nobody steers. A trial depends on its
-rule alone: the seed changes the noise on RXD between keyed frames, and nothing else.
+Robots are placed far apart; the radio has no errors; there is no camera, because no host steers. A trial depends on its
+rule only: the seed changes the noise on RXD between keyed frames, and nothing else.
 """
 
 from __future__ import annotations
@@ -42,7 +42,7 @@ _PLACES = [(x_cm, y_cm) for y_cm in (15.0, 55.0, 35.0) for x_cm in (10.0, 40.0, 
 
 @dataclass(frozen=True)
 class Trial:
-    """What happens and what is expected of it, by network."""
+    """A trial: scripts and expectations by network."""
 
     scenario: Scenario
     script: tuple[ScriptItem, ...]
@@ -103,7 +103,7 @@ def _network(topology: Topology, places: Iterator[tuple[float, float]]) -> dict[
 
 
 def run_trial(trial: Trial, check: Check, image: Image, seed: int) -> Run:
-    """Its run under one check of each robot, to its end, or to a thousand firmware faults."""
+    """Runs the trial with one check for each robot, to its end or to a thousand firmware faults."""
     places = [
         (index, robot.slot)
         for index, network in enumerate(trial.scenario.networks)

@@ -1,12 +1,12 @@
-"""What the host of a network says in a trial, and what is expected of its robots: the words in which rules are written.
+"""The language of rules: frames that a network's host sends in a trial, and expectations on its robots.
 
     frame = script.team()                 velocities that no frame before it had
     script.obeyed(frame)                  expected of each robot of the network
     script.wait(5.0)
     script.ignored(script.team(wrong={3: 0x10}))
 
-A trial is open: what is said does not depend on what the robots do. So everything is known in advance, and so is the
-tick at which each expectation is over.
+A trial is open-loop: the frames do not depend on the robots. So all frames, and the tick at which each expectation
+ends, are known in advance.
 """
 
 from __future__ import annotations
@@ -51,10 +51,10 @@ BOOTED_MS = 40.0
 """A robot is ready for its first frame so long after power-on (a camera frame and a little more). Chosen."""
 ACTING_MS = ACTING_TICKS / TICKS_PER_MS
 GAP_MS = ACTING_MS + 2.0
-"""From the end of a frame to the start of the next, unless a rule says otherwise: time to act."""
+"""From the end of a frame to the start of the next, unless a rule sets another gap: time for the robots to act."""
 Pairs = tuple[tuple[int, int], ...]
 Found = Iterator[tuple[int, str]]
-"""Failures of an expectation: since which tick, and what was found instead. The first one counts."""
+"""Failures of an expectation: tick, and a text about the wrong behaviour. The first one counts."""
 Test = Callable[[Observed], Found]
 Says = Callable[[TelemetryFrame, ReceivedAnswer, Observed], str]
 """The error in an answer's content, or ""."""
@@ -64,7 +64,7 @@ Says = Callable[[TelemetryFrame, ReceivedAnswer, Observed], str]
 class Frame:
     """Characters on the air. `last_tick`: start bit of the last one; `end_tick`: end of its stop bit.
 
-    `before`: the velocities of the last frame that had some.
+    `before`: the velocities of the last frame that contained velocities.
     """
 
     tick: int
@@ -82,15 +82,15 @@ class Frame:
 
     @property
     def acted_tick(self) -> int:
-        """When robots have acted on it."""
+        """Tick at which robots must have acted on it."""
         return self.end_tick + ACTING_TICKS
 
 
 @dataclass(frozen=True, slots=True)
 class TrialExpectation:
-    """`test` says what is wrong. It is over at `tick`: later events change nothing in it.
+    """`test` yields failures. The expectation ends at `tick`: later events change nothing in it.
 
-    `slots`: of the robots that it concerns. `by_answers`: what the PC hears is all that it needs.
+    `slots`: the robots that it concerns. `by_answers`: it can be judged by the characters that the PC receives.
     """
 
     tick: int
@@ -105,7 +105,7 @@ class TrialExpectation:
 
 
 class How(TypedDict, total=False):
-    """How a frame is sent; see `TrialScript.say`."""
+    """Options of sending a frame; see `TrialScript.say`."""
 
     slot: int
     step: int
@@ -176,7 +176,7 @@ class TrialScript:
         return tuple((left, right) if slot in there else pair for slot, pair in enumerate(self.words()))
 
     def ask(self, label: str = "", words: Pairs | None = None, **how: Unpack[How]) -> Frame:
-        """A question to the robot in `slot`, with the next number that asks it."""
+        """A question to the robot in `slot`, with the next number reserved for it."""
         slot = how.get("slot", self.slot)
         how["step"] = asking_step(self.seq, slot, self.n)
         return self.team(words, ask=True, label=label or f"question to robot {slot}", **how)
@@ -186,7 +186,7 @@ class TrialScript:
         return self.say(FrameType.SERVICE, payload, label or f"service frame, opcode {opcode}", **how)
 
     def ping(self, **how: Unpack[How]) -> Frame:
-        """A service frame that changes nothing."""
+        """A service frame without an effect."""
         return self.service(Opcode.PING, label="ping", **how)
 
     def filter(self, words: Words, label: str = "", **how: Unpack[How]) -> Frame:
@@ -207,12 +207,11 @@ class TrialScript:
         return self.ask(**how)
 
     def say(self, kind: int, payload: bytes, label: str, words: Pairs = (), **how: Unpack[How]) -> Frame:
-        """A frame whose number is `step` past the last fresh one, which it becomes unless `fresh` is false.
-
-        Instead of its preamble it may have another `lead`, and another `layout` byte in its CRC. `wrong` turns bits
-        over, by place, `bad_stop` is the place of a character with a bad stop bit, and `pauses` (us) come before
-        characters: places count from the first sync byte, the preamble's are negative. `gap_ms`: silence after it.
-        `sealed`: another way to seal it. `slot`: whom it asks or sets, if not the first robot.
+        """A frame with the number of the last fresh frame plus `step`; it becomes the last fresh one unless `fresh` is
+        false. `lead` replaces its preamble, `layout` the layout byte in its CRC. `wrong`: place -> bits to invert;
+        `bad_stop`: place of a character with a bad stop bit; `pauses`: place -> pause in us before that character.
+        Places count from the first sync byte, the preamble's are negative. `gap_ms`: silence after it. `sealed`:
+        another way to seal it. `slot`: the robot it addresses, if not the first.
         """
         seq = (self.seq + how.get("step", 1)) % SEQ_MODULUS
         self.seq = seq if how.get("fresh", True) else self.seq
@@ -242,7 +241,7 @@ class TrialScript:
         return begun
 
     def characters(self, data: bytes, bad_stop: tuple[int, ...] = ()) -> None:
-        """Characters right after those that were sent last, if nothing was waited."""
+        """Sends characters; they follow the last sent ones without a pause unless `wait` was called."""
         self.sent.append(Transmission(self.now, DOWN, data, self.network, bad_stop))
         self.now += len(data) * self.character_ticks
 
@@ -312,7 +311,7 @@ class TrialScript:
                 yield event.tick, text
 
     def answered(self, question: Frame, wanted: str = "", says: Says | None = None) -> None:
-        """The robot that it asks answers in time, and with this number."""
+        """Expects that the addressed robot answers in time, with the number of `question`."""
         slot, deadline = question.seq % self.n, over_by(question)
 
         @self.expects(deadline, wanted or f"an answer to {question.what}", (slot,), by_answers=True)
@@ -327,7 +326,7 @@ class TrialScript:
                 yield answers[0].tick, reason
 
     def silent(self, after_tick: int, until_tick: int, why: str) -> None:
-        """The PC receives nothing in between."""
+        """Expects that the PC receives nothing from `after_tick` to `until_tick`."""
 
         @self.expects(until_tick, f"silence: {why}", by_answers=True)
         def test(observed: Observed) -> Found:
@@ -337,7 +336,7 @@ class TrialScript:
 
 
 def _instead(observed: Observed, frame: Frame, orders: tuple[Order, Order]) -> str:
-    """How the robot reacted to the frame, where that is plain; else ""."""
+    """The robot's wrong reaction to the frame in words, if it is recognised; else ""."""
     if max(order.tick for order in orders) <= frame.tick:
         late = _obeyed_late(observed, frame)
         if late is not None:
@@ -387,7 +386,7 @@ def ms(time_ms: float) -> int:
 
 
 def obeys(order: Order, word: int) -> bool:
-    """True if a wheel under `order` does what the radio's `word` says."""
+    """True if the wheel under `order` obeys the radio's velocity `word`."""
     return (order.what == "drive" and order.word == word) or (word == 0 and order.what == "stop")
 
 

@@ -1,7 +1,7 @@
-"""What names mean on a board of parts: `eyes.distance_cm`, `lcd.text`, the net `SDA`, all `parts`, all `nets`.
+"""Names on a board of parts: `eyes.distance_cm`, `lcd.text`, the net `SDA`, all `parts`, all `nets`.
 
-Names of the program come first, then registers, then parts, then nets. `parts.NAME` and `nets.NAME` mean a part and a
-net also where something else has its name.
+Names of the program come first, then registers, then parts, then nets. `parts.NAME` and `nets.NAME` always name a part
+and a net, even if something else has the same name.
 """
 
 from __future__ import annotations
@@ -42,7 +42,7 @@ def value_on(board: ProcessorBoard, name: str) -> Value | None:
 
 
 def levels_put_on(board: ProcessorBoard, port: int) -> int:
-    """What parts put on the pins of a port."""
+    """The levels that parts drive onto the pins of a port."""
     if not isinstance(board, WiredBoard):
         return 0xFF
     _sync(board)
@@ -50,7 +50,7 @@ def levels_put_on(board: ProcessorBoard, port: int) -> int:
 
 
 def _part(board: WiredBoard, name: str) -> Value:
-    """All its values: what a test may read, and what it may put."""
+    """All values of a part: those that a test may read, and those that it may put."""
     part = board.parts[board.part_index[name]]
     put = [key for key in part.keys.PUTS if hasattr(part, key)]
     names = dict.fromkeys((*part.keys.READS, *put))

@@ -35,9 +35,9 @@ class Console(Cmd):
         return self.session.ended
 
     def onecmd(self, line: str) -> bool:
-        """Does one line, or the last step again where it is empty, and shows what came of it; whether it is the last.
+        """Runs one line, or repeats the last step for an empty line, and shows the result.
 
-        Ctrl-C ends a search, where it is.
+        Returns True after the last line. Ctrl-C stops a search at its present place.
         """
         stopped: list[int] = []
         before = signal.signal(signal.SIGINT, lambda number, frame: stopped.append(number))
@@ -58,13 +58,13 @@ class Console(Cmd):
         return self.ended
 
     def postcmd(self, stop: bool, line: str) -> bool:
-        """Nothing more of a list of commands is done after Ctrl-C; who types goes on."""
+        """Drops the rest of a list of commands after Ctrl-C; an interactive user continues."""
         if self.interrupted and not self.prompt:
             raise KeyboardInterrupt
         return stop
 
     def completedefault(self, text: str, line: str, begin: int, end: int) -> list[str]:
-        """What may stand in place of the `text` from `begin` on."""
+        """Completions of the `text` from `begin` on."""
         first, words = completions(self.session, line[:end])
         return [
             line[begin:first] + word[max(begin - first, 0) :] for word in words

@@ -47,8 +47,8 @@ def debug(options: DebugOptions) -> int:
     """Steps through the firmware of SUBJECT, forwards and backwards.
 
     SUBJECT is a scenario, an image (on the bare processor, or on --board), a board file with --firmware, a recording, a
-    stream file, or a case, which stands at its failed check, as a scenario with steps does at the one that fails.
-    `help` lists the commands. With --dap or --listen an editor says what is debugged.
+    stream file, or a case. A case opens at its failed check, a scenario with steps at the failed step. `help` lists the
+    commands. With --dap or --listen the editor chooses the subject.
     """
     if options.listen is not None:
         return _listen(options.listen)
@@ -75,7 +75,10 @@ def debug(options: DebugOptions) -> int:
 
 
 def _listen(port: int) -> int:
-    """Serves the first client of this user. Where the system does not tell whose it is, it needs the token."""
+    """Serves the first client of this user.
+
+    If the system does not reveal the client's user, the client needs the token.
+    """
     token = "" if _TCP.exists() else secrets.token_hex(16)
     try:
         with socket.create_server(("127.0.0.1", port)) as server:
@@ -109,7 +112,7 @@ def _written(host: str, port: int) -> str:
 
 
 def _serve(wire: Wire, token: str = "") -> int:
-    """One client, until it leaves."""
+    """Serves one client until it disconnects."""
     adapter = Adapter(wire, token)
     with suppress(OSError):
         adapter.serve()

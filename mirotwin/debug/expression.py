@@ -1,10 +1,10 @@
-"""Expressions of the debugger: names, `.` `->` `[]` `*` `&`, arithmetic, comparisons, as C has them.
+"""Expressions of the debugger: names, `.` `->` `[]` `*` `&`, arithmetic and comparisons as in C.
 
     age >= 110 && !heard     frame[2].left     *pointer     lm629.left.real_position - start     R7 == 0x3F     P1.0
     eyes.distance_cm < 30    lcd.text == "READY"    $sp > 0x60
 
-An expression is read once into a function of a moment, which looks names up; so a condition costs little each time it
-is asked. Numbers do not wrap. Nothing is ever written.
+An expression is compiled once into a function of a moment, which looks names up, so evaluating a condition is cheap.
+Numbers do not wrap. Nothing is ever written.
 """
 
 from __future__ import annotations
@@ -42,7 +42,7 @@ class NoValue(BadInput):
 
 
 class Lookup(Protocol):
-    """Where an expression is evaluated: at a processor that stands somewhere (`symbols.Moment`)."""
+    """The environment of an expression: a processor at a moment of the run (`symbols.Moment`)."""
 
     def find(self, name: str, module: str) -> Value:
         """The meaning of a name; `module`: the file that is named before it. Raises NoValue."""
@@ -52,9 +52,10 @@ class Lookup(Protocol):
 
 
 class Value(msgspec.Struct, frozen=True):
-    """Something an expression means. `kind`, `space`, `address`: of what lies in a memory of `moment`.
+    """The value of an expression. `kind`, `space`, `address`: type and place, for a value in a memory of `moment`.
 
-    `number`: of what does not. `members`: of a group, functions by name. `note`: where it is, or why it may be stale.
+    `number`: for a value without a place. `members`: of a group, functions by name. `note`: its place, or why it may be
+    stale.
     """
 
     kind: CType | None = None
@@ -72,7 +73,7 @@ _ZERO = Value(number=0)
 
 
 def expression(text: str, known: Collection[str] = ()) -> Term:
-    """What `text` means. Raises NoValue for what is no expression, and for names that are not `known`, if some are."""
+    """Compiles `text`. Raises NoValue for a syntax error, and for names not in `known`, if `known` is not empty."""
     reader = _Reader(text, known)
     term = reader.binary(0)
     if reader.token:
@@ -81,7 +82,7 @@ def expression(text: str, known: Collection[str] = ()) -> Term:
 
 
 def names_in(text: str) -> list[tuple[str, str]]:
-    """(module or "", name) of what an expression looks up."""
+    """(module or "", name) of each name in an expression."""
     tokens = _TOKEN.findall(text)
     pairs = [(token.rpartition(":"), before) for token, before in zip(tokens, ["", *tokens], strict=False)]
     return [
@@ -90,7 +91,10 @@ def names_in(text: str) -> list[tuple[str, str]]:
 
 
 def content(value: Value) -> Any:
-    """What it holds: int, float, bool, list, dict. Raises BadInput for bytes of a memory that is not there."""
+    """The content of a value: int, float, bool, list or dict.
+
+    Raises BadInput for bytes of a memory that does not exist.
+    """
     if value.members is not None:
         return {name: content(get()) for name, get in value.members.items()}
     if value.moment is None or value.kind is None:
@@ -161,7 +165,7 @@ def _element(value: Value, index: int, text: str = "") -> Value:
 
 
 def pointed(value: Value, index: Any, text: str) -> Value:
-    """What a pointer points to, or so many elements after it; of an array its element."""
+    """The element at `index` behind a pointer, or of an array. `text` is for errors."""
     if not isinstance(index, int):
         raise NoValue(f"[{index}] is no whole number")
     kind = value.kind
@@ -207,7 +211,7 @@ _SIGNS: dict[str, Callable[..., Any]] = {
 
 
 def _applied(apply: Callable[..., Any], sign: str, *terms: Term) -> Term:
-    """An operator's value of those of its operands."""
+    """A term that applies an operator to its operands."""
 
     read = operand if sign in ("==", "!=") else number
 
@@ -228,7 +232,7 @@ def _applied(apply: Callable[..., Any], sign: str, *terms: Term) -> Term:
 
 
 def _either(stops: bool, left: Term, right: Term) -> Term:
-    """`||` (stops where the left side is true) and `&&`."""
+    """`||` (`stops`: a true left side decides) and `&&`."""
 
     def either(moment: Lookup) -> Value:
         truth = bool(number(left(moment)))
@@ -259,7 +263,7 @@ class _Reader:
 
     @property
     def token(self) -> str:
-        """The next one, "" at the end."""
+        """The next token, "" at the end."""
         return self.tokens[0] if self.tokens else ""
 
     def take(self) -> str:
@@ -296,7 +300,7 @@ class _Reader:
         return _applied(_SIGNS[sign], sign, term)
 
     def postfix(self, term: Term, first: int) -> Term:
-        """What follows a term, whose own text begins with the token `first`."""
+        """Parses the postfix operators after `term`; the text of `term` begins with token number `first`."""
         while self.token in (".", "->", "["):
             text = "".join(self.taken[first:])
             how = self.take()
@@ -344,7 +348,7 @@ class _Reader:
 
 
 def _text(token: str) -> str:
-    """What stands between the quotes."""
+    """The text between the quotes."""
     escaped = re.compile(r"\\(.)", re.DOTALL)
     return escaped.sub(lambda match: chr(_ESCAPES.get(match[1], ord(match[1]))), token[1:-1])
 

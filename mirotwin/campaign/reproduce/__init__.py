@@ -1,1 +1,1 @@
-"""The paper's section V, run again: five figures, claims beside what was measured, and what a better chain gains."""
+"""The paper's section V reproduced: five figures, each claim beside the measurement, and the gain of a better chain."""

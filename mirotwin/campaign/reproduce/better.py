@@ -37,10 +37,9 @@ def camera_name(camera: str) -> str:
 
 
 class Comparison(msgspec.Struct, frozen=True):
-    """The paper's law beside a rival with the same seeds: from `figure`'s start, under `camera`, by `error`.
-
-    `settled`: runs of each that settle, of `runs`. Medians in cm, over the `pairs` of which both settle. `nearer`:
-    by how much the paper's law is nearer in the median pair, in cm. `by_settled`: what decides is how many settle.
+    """The paper's law against a rival with the same seeds, from `figure`'s start, under `camera`, compared by `error`.
+    `settled`: settled runs of each law, of `runs`. Medians in cm, over the `pairs` in which both settle. `nearer`:
+    advantage of the paper's law in the median pair, in cm. `by_settled`: the number of settled runs decides.
     """
 
     figure: int
@@ -57,7 +56,7 @@ class Comparison(msgspec.Struct, frozen=True):
 
 
 def compare(table: Table, figure: int, rival: str, camera: str, error: str) -> Comparison:
-    """One comparison. Seeds that one of the two did not run are left out."""
+    """Compares the laws; seeds that one of the two did not run are left out."""
     ours, theirs = (
         {row.seed: row for row in rows_of(table, figure, controller, camera)} for controller in (PAPER, rival)
     )

@@ -1,8 +1,9 @@
-"""Each claim of the paper's section V beside what was measured.
+"""Each claim of the paper's section V beside the measurement.
 
-A verdict is computed. "holds" and "does not hold" are a criterion that stands with it; what is true of some cases only
-"holds in part". Errors and chattering are compared over the runs that settle: a robot that ran away does not chatter.
-Where none settles, that case is not judged. The two claims about runs that fail to converge are about all runs.
+A verdict is computed. "holds" and "does not hold" follow from the criterion given with the claim; a claim that is true
+of some cases only "holds in part". Errors and chattering are compared over the runs that settle: a robot that ran away
+does not chatter. A case in which no run settles is not judged. The two claims about runs that fail to converge are
+about all runs.
 """
 
 from __future__ import annotations
@@ -41,7 +42,7 @@ BOUND_CM = 2.40
 
 
 FEW = 4
-"""So many cases of a claim are listed one by one on the page."""
+"""Largest number of cases of a claim that the page lists one by one."""
 
 
 class Judged(NamedTuple):
@@ -61,7 +62,7 @@ class Case(NamedTuple):
 
 
 class ClaimResult(msgspec.Struct, frozen=True):
-    """A claim, its criterion, what was measured, what of it decides, and what follows."""
+    """A claim, its criterion, the measurement, the deciding part of it, and the verdict."""
 
     figure: str
     claim: str
@@ -85,14 +86,15 @@ def _error(rows: Sequence[RunRow]) -> str:
 
 
 def _of_cases(cases: Sequence[bool | None], some: str = PART) -> str:
-    """The verdict on a claim that is to hold in all cases; `some`: that where it holds in some. None: not judged."""
+    """The verdict on a claim about all cases; `some`: the verdict if it holds in some only. A case None is not judged.
+    """
     if all(case is None for case in cases):
         return NOT_JUDGED
     return HOLDS if all(cases) else some if any(cases) else NOT
 
 
 def judged(cases: Sequence[Case]) -> Judged:
-    """A claim that is to hold in all cases. Of many cases only few decide."""
+    """Judges a claim that must hold in all cases. Of many cases only the deciding few are listed."""
 
     def texts(some: Sequence[Case]) -> str:
         return "; ".join(f"{case.name}: {case.measured}" for case in some)
@@ -112,7 +114,7 @@ def judged(cases: Sequence[Case]) -> Judged:
 
 
 def _plain(measured: str, verdict: str) -> Judged:
-    """All that was measured decides."""
+    """The result of a claim whose whole measurement decides."""
     return Judged(measured, measured, verdict)
 
 
@@ -226,7 +228,7 @@ def _superior(table: Table) -> Judged:
 
 
 def superior(verdicts: Sequence[str]) -> str:
-    """What decides the last claim."""
+    """The text of the deciding measurement of the last claim."""
     better, worse = verdicts.count(OURS), verdicts.count(THEIRS)
     return f"better in {better} of {len(verdicts)} comparisons, worse in {worse}"
 
@@ -280,7 +282,7 @@ CLAIMS: tuple[tuple[str, str, str, Callable[[Table], Judged]], ...] = (
      " epsilon-tracking for this loop ([the comparisons one by one](#which-of-the-two-laws-is-better))", _superior),
 )
 # fmt: on
-"""Figure, claim, criterion, and what judges it; in the order of the paper."""
+"""Figure, claim, criterion, and the function that judges it; in the order of the paper."""
 
 
 def findings(table: Table) -> list[ClaimResult]:
@@ -289,5 +291,5 @@ def findings(table: Table) -> list[ClaimResult]:
 
 
 def number(value: float | None, digits: int = 2) -> str:
-    """For people; a dash for what is not there."""
+    """A number for people; a dash for None."""
     return "-" if value is None else f"{value:.{digits}f}"

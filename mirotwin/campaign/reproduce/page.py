@@ -1,6 +1,5 @@
-"""The page, from its tables: which law is better, claims with their verdicts, the figures, what the camera decides.
-
-The same tables give the same bytes: no date, no time taken.
+"""The page, from its tables: which law is better, claims with verdicts, the figures, the effect of the camera. The same
+tables give the same bytes: no date, no duration.
 """
 
 from __future__ import annotations
@@ -47,7 +46,7 @@ in *truth*, or as the *camera* sees it (measurement against reference), which is
 
 
 def page(stored: StoredTables, folder: str, tables: str) -> str:
-    """The whole text. `folder`: where the pictures are, and the file of all tables, as links say it."""
+    """The whole text. `folder`: link to the pictures and to the file of all tables."""
     parts = _better(stored), _claims(stored), _figures(stored, folder), _cameras(stored)
     head = HEAD.format(opening=_opening(stored), tables=f"{folder}/{tables}", **stored.about)
     return "\n".join([head, *(line for part in parts for line in part)])
@@ -102,7 +101,7 @@ def _wins(rows: Iterable[Row], verdict: str) -> int:
 
 
 def _opening(stored: StoredTables) -> str:
-    """What the page has to say first: which law is better depends on the camera and on the error."""
+    """The opening of the page: which law is better depends on the camera and on the error."""
     lines = []
     for camera in ALL_CAMERAS:
         counts = []

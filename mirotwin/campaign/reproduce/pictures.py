@@ -20,7 +20,7 @@ SIDES = ("in truth", "as the camera sees it")
 
 
 def track_of(path: str | Path, delay_frames: int) -> RobotTrack:
-    """The first robot of a recording. `delay_frames`: of a camera whose measurements bear no tick."""
+    """The first robot of a recording. `delay_frames`: delay of a camera whose measurements have no tick."""
     track = RobotTrack(delay_frames)
     for period in read(path).periods:
         track.add(period.robots[0], period.tick)
@@ -28,7 +28,7 @@ def track_of(path: str | Path, delay_frames: int) -> RobotTrack:
 
 
 def draw(path: Path, title: str, tracks: Mapping[str, RobotTrack]) -> None:
-    """Writes the SVG of tracks by their names in the legend: left in truth, right as the camera sees it."""
+    """Writes the SVG of tracks, by their legend names: truth left, camera measurement right."""
     drawing = Drawing(*SIZE, (title,))
     for side in (0, 1):
         drawing.add(_path_panel(tracks, bool(side)), _box(side, TOP, PATH))

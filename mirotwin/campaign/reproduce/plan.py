@@ -86,13 +86,14 @@ DISTURBANCES = {
     "control noise 5 cm/s, 0.25 rad/s": ("network.control_noise={v_m_s = 0.05, w_rad_s = 0.25}",),
     "control noise 20 cm/s, 1 rad/s": ("network.control_noise={v_m_s = 0.2, w_rad_s = 1.0}",),
 }
-"""The paper's disturbances 1 and 2 of section V-A, for Figs. 6 to 8. It gives no bounds: these are chosen. Every other
-run integrates by Euler's rule, which is off by half a step of an acceleration that changes; that of second order is
-the same run without this error, and short words round what the integrator gives to 22 mm/s."""
+"""The paper's disturbances 1 and 2 of section V-A, for Figs. 6 to 8. It gives no bounds: these are chosen. All other
+runs integrate by Euler's rule, with an error of half a step of a changing acceleration. The second-order run is without
+this error. Short words round the integrator's output to 22 mm/s.
+"""
 INTEGRATION = tuple(DISTURBANCES)[:2]
 CONTROL_NOISE = tuple(DISTURBANCES)[2:]
 NOISE = "network.robot.estimator={kind = 'ekf', position_noise_m = 0.0081, heading_noise_rad = 0.028}"
-"""What the filter has to know of white noise of 2.40 cm and 4.83 degrees (three standard deviations)."""
+"""The filter's parameters for white noise of 2.40 cm and 4.83 degrees (three standard deviations)."""
 
 
 class RunGroup(msgspec.Struct, frozen=True):
@@ -159,9 +160,9 @@ def plan_of(seeds: range) -> Plan:
 
 
 def recorded(plan: Plan, seeds: Mapping[str, int], place: Callable[[str], str]) -> list[Work]:
-    """The run of each group in `seeds` with that seed, of the whole scenario with what it expects.
+    """For each group in `seeds`, its run with that seed, of the whole scenario with its expectations.
 
-    `place`: the file for a recording, by its name.
+    `place(name)`: path of the recording.
     """
     jobs = []
     for index, group in enumerate(GROUPS):

@@ -93,7 +93,7 @@ def reproduce(options: ReproduceOptions) -> int:
 
 
 def _run(plan: Plan, workers: Workers, path: Path, hold: Hold, quiet: bool) -> list[RunRow]:
-    """All rows, each in the file as soon as it is there."""
+    """All rows; each is written to the file when it is ready."""
     rows: list[RunRow] = []
     names = [field.name for field in msgspec.structs.fields(RunRow)]
     with (

@@ -14,13 +14,12 @@ from mirotwin.campaign.worker import RunOutcome
 
 
 class RunRow(msgspec.Struct, frozen=True):
-    """What the first robot of a run did; `error` says why there is nothing else.
+    """Figures of the first robot of a run; `error`: the reason if there are none.
 
     `rms_*`: root mean square over the last second, truth against reference; `seen_*`: measurement against the reference
     at its exposure (None, if the robot was not seen in that second). `settling_s` as in summary.json; `settled`: within
-    3 cm and 0.15 rad for the whole last second. `vision_*`: frames, and
-    those in which a robot was not found. The last five: `recording.theory.figures`, None or 0 where no
-    host steered it.
+    3 cm and 0.15 rad for the whole last second. `vision_*`: frames, and frames in which a robot was not found. The last
+    five come from `recording.theory.figures`; None or 0 if no host steered the robot.
     """
 
     label: str
@@ -85,7 +84,7 @@ def by_label(rows: Iterable[RunRow]) -> dict[str, list[RunRow]]:
 
 
 def values(rows: Sequence[RunRow], name: str) -> list[float]:
-    """One figure of all rows that have it, in their order."""
+    """One figure of all rows that have it, in the order of the rows."""
     return [float(value) for row in rows if (value := getattr(row, name)) is not None]
 
 
@@ -103,7 +102,7 @@ def percentile(rows: Sequence[RunRow], name: str, share: float) -> float | None:
 
 
 def middle_seeds(table: Table) -> dict[str, int]:
-    """The seed of each group whose error is the median (of an even number, the lower one); none, if all failed."""
+    """Group -> the seed with the median error (of an even number, the lower middle one); empty if all failed."""
     middles = {}
     for label, rows in table.items():
         ordered = sorted((row.rms_position_cm, row.seed) for row in rows if row.rms_position_cm is not None)
@@ -118,5 +117,6 @@ def never_settled(rows: Sequence[RunRow]) -> int:
 
 
 def settled(rows: Sequence[RunRow]) -> list[RunRow]:
-    """Runs that were within 3 cm and 0.15 rad for the last second. Errors of others say how far they got."""
+    """Runs that were within 3 cm and 0.15 rad for the last second. The errors of other runs only show how far they got.
+    """
     return [row for row in rows if row.settled]

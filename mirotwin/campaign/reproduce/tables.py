@@ -133,7 +133,7 @@ def _disturbances(table: Table) -> Iterator[Row]:
 
 
 def _lost(table: Table) -> Iterator[Row]:
-    """Why one controller ends so far off from one start."""
+    """Rows that explain why one controller ends far off from one start."""
     yield ["figure", "controller", "frames lost", "frames", "median, cm", f"with {LOST.camera}, cm"]
     seen, everywhere = (
         rows_of(table, LOST.start.figure, LOST.controller, camera) for camera in ("", LOST.camera)

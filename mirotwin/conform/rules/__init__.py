@@ -1,4 +1,4 @@
-"""All rules, in the order of their numbers, finding one, and what presupposes what."""
+"""All rules in the order of their numbers, look-up of a rule, and the rules that each one presupposes."""
 
 from __future__ import annotations
 
@@ -33,7 +33,7 @@ _BY_ID = {rule.id: rule for rule in ALL}
 
 
 def chapter_of(rule: Rule) -> Chapter:
-    """The chapter that a rule stands in."""
+    """The chapter of a rule."""
     return next(chapter for chapter in CHAPTERS if rule in chapter.rules)
 
 

@@ -1,4 +1,4 @@
-"""Rules about what a robot says: when, in which form, and what is in it."""
+"""Rules about a robot's answers: their times, form and content."""
 
 from __future__ import annotations
 
@@ -189,7 +189,7 @@ def status(script: TrialScript) -> None:
 
 
 def _run_away(script: TrialScript) -> None:
-    """Gains of 0 and a fast left wheel: its desired position runs away from the real one."""
+    """Sends gains of 0 and a fast left wheel, so the desired position runs away from the real one."""
     script.filter((0, 0, 0, 0))
     for _ in range(8):
         script.team(script.same(16000, 50), gap_ms=30.0)
@@ -258,7 +258,7 @@ def _positions(content: TelemetryFrame, answer: ReceivedAnswer, observed: Observ
 
 
 def _read_at_once(content: TelemetryFrame, answer: ReceivedAnswer, observed: Observed) -> str:
-    """Each position is the low word of what one RDRP read; a robot that reads no RDRP is not judged by this."""
+    """Each position must be the low word of one RDRP reading. A robot that reads no RDRP is not judged by this."""
     for side, position in (("left", content.position_left), ("right", content.position_right)):
         read = observed.read_positions(side, answer.frame.start_tick - ms(14.0), answer.tick)
         if read and position not in read:
@@ -273,7 +273,7 @@ def _read_at_once(content: TelemetryFrame, answer: ReceivedAnswer, observed: Obs
 
 
 def _within(position: int, ends: tuple[int, int]) -> bool:
-    """True if these 16 bits are a position between the ends, or two counts beyond."""
+    """True if these 16 bits are a position between the ends, with two counts of tolerance."""
     low, high = min(ends) - 2, max(ends) + 2
     return (position - low) & 0xFFFF <= high - low
 

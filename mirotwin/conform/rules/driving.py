@@ -1,4 +1,4 @@
-"""Rules about what a team frame makes the wheels do."""
+"""Rules about the wheels' reaction to a team frame."""
 
 from __future__ import annotations
 

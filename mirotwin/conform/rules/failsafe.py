@@ -58,7 +58,8 @@ def not_put_off(script: TrialScript) -> None:
 
 
 def _stop_of_a_busy_robot(script: TrialScript) -> None:
-    """While one wheel still comes to a stop and an acceleration waits for that, syncs in a row before a frame."""
+    """One wheel is still stopping and an acceleration waits for it; several syncs in a row come before the next frame.
+    """
     for syncs in (16, 24):
         for _ in range(8):
             script.team(script.same(0, 12000))
@@ -91,7 +92,7 @@ def smooth(script: TrialScript) -> None:
 
 
 def _slows_down(script: TrialScript, after_tick: int, until_tick: int, acceleration: int) -> None:
-    """From one control period to the next the velocities fall by what the acceleration makes in 97 or 98 samples."""
+    """From one control period to the next the velocities must fall by the acceleration times 97 or 98 samples."""
     samples = CONTROL_PERIOD_TICKS // SAMPLE_TICKS
 
     @script.expects(until_tick, f"wheels slowed down by {acceleration} / 65536 count per sample^2")
@@ -113,7 +114,7 @@ def _slows_down(script: TrialScript, after_tick: int, until_tick: int, accelerat
 
 
 def _stays_closed(script: TrialScript, last: Frame, until_tick: int) -> None:
-    """No abrupt stop, and the motors stay on."""
+    """There must be no abrupt stop, and the motors must stay on."""
 
     @script.expects(until_tick, "a smooth stop")
     def test(observed: Observed) -> Found:
@@ -153,7 +154,7 @@ def back(script: TrialScript) -> None:
 
 
 def _turning(script: TrialScript, frame: Frame) -> None:
-    """Both wheels turn as told, as seen from the encoders, when they had time for it."""
+    """Both wheels must turn as ordered, measured at the encoders, after time for acceleration."""
     until = frame.end_tick + ms(60.0)
 
     @script.expects(until, f"wheels that turn as by {frame.what}")

@@ -1,6 +1,6 @@
-"""Rules about wheels that do not follow: a broken wire of an encoder, or something that holds the wheel.
+"""Rules about wheels that do not follow: an encoder wire is broken, or the wheel is blocked.
 
-A trial has neither. It sets the filter gains to 0, so that a wheel stands while its LM629 wants it elsewhere.
+A trial simulates both by filter gains of 0: the wheel stands still while its LM629's desired position moves on.
 """
 
 from __future__ import annotations
@@ -45,7 +45,7 @@ def lost_is_told(script: TrialScript) -> None:
 
 
 def _turn_in_vain(script: TrialScript, left: int, right: int) -> Frame:
-    """The first of some frames, questions too, that tell wheels without gains to turn."""
+    """The first of several frames, some with questions, that order wheels without gains to turn."""
     script.filter((0, 0, 0, 0), "filter frame without gains")
     words = script.same(left, right)
     first = script.obeyed(script.team(words, label="team frame to wheels without gains"))

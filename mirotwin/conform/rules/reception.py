@@ -1,4 +1,4 @@
-"""Rules about what is a valid frame: sync, stop bits, spacing, CRC, and the window that is emptied."""
+"""Rules about valid frames: sync, stop bits, spacing, CRC, and the emptying of the receive window."""
 
 from __future__ import annotations
 
@@ -21,9 +21,9 @@ LONGEST_US, SHORTEST_US = 80.0, 20.0
 
 
 def refused(script: TrialScript, ways: Iterable[tuple[str, How]], in_a_row: int = 0) -> None:
-    """Frames, each damaged in one of these ways: no robot acts on any of them, and all on the good ones in between.
+    """Sends frames damaged in these ways, with good frames between. Robots must act on the good ones only.
 
-    Some follow each other without a pause, as many as are over before the failsafe comes.
+    `in_a_row`: number of damaged frames without a pause, small enough that the failsafe does not act.
     """
     in_a_row = in_a_row or (3 if script.n == 3 else 2)
     before = ""
@@ -102,7 +102,7 @@ def wrong_bits(script: TrialScript) -> None:
 
 
 def _wrong_bits(script: TrialScript) -> Iterator[tuple[str, How]]:
-    """One wrong bit in each character, then samples of two to four."""
+    """One wrong bit in each character, then samples of two to four wrong bits."""
     characters = range(2, script.form.size)
     for character in characters:
         yield (

@@ -21,7 +21,7 @@ _FRAMES = 2000
 _EACH = 100
 _OFF_MS = 520.0
 _WRAPS_MS = (2560.0, (1 << 23) / 1000, 8542.5, (1 << 24) / 1000, 32768.0, (1 << 25) / 1000, 65536.0)
-"""Where counts begin again: 8 bits of 10 ms or of camera frames, 23 to 25 bits of microseconds, 15 or 16 of ms."""
+"""Wrap times of counters: 8 bits of 10 ms or of camera frames, 23 to 25 bits of microseconds, 15 or 16 bits of ms."""
 
 
 def nothing_refused(script: TrialScript) -> None:
