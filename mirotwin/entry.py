@@ -1,8 +1,8 @@
-"""Where the `mirotwin` program starts: Ctrl-C is one line and exit code 130 from the first moment to the last.
+"""Entry point of the `mirotwin` program: at any moment Ctrl-C gives one line and exit code 130.
 
-Loading takes half a second, in which nothing has been opened yet: the process ends at once, whatever module is half
-imported. A command that runs gets KeyboardInterrupt and cleans up (`shell.program`). Once its exit code is known all is
-written, and Ctrl-C comes too late: in the last moments of the interpreter an exception would be a traceback.
+Loading takes half a second, in which nothing is open yet, so Ctrl-C ends the process at once, even in the middle of an
+import. A running command gets KeyboardInterrupt and cleans up (`shell.program`). When its exit code is known everything
+is written, and Ctrl-C is ignored: during the interpreter's shutdown an exception would print a traceback.
 """
 
 from __future__ import annotations
@@ -16,7 +16,7 @@ from _thread import start_new_thread
 from types import FrameType
 
 INTERRUPTED = 130
-"""As in `shell.verdicts`: nothing is imported here that Ctrl-C could leave half imported."""
+"""Equal to the code in `shell.verdicts`: an import here could be interrupted by Ctrl-C."""
 LOADING, RUNNING, ENDED = range(3)
 
 _phase = LOADING
@@ -30,7 +30,9 @@ def _on_interrupt(number: int, frame: FrameType | None) -> None:
 
 
 def _again(ignored: sys.UnraisableHookArgs) -> None:
-    """Ctrl-C within a callback of the interpreter's, as importing has them, ends nothing: it is sent again after it."""
+    """Sends Ctrl-C again if it came within a callback of the interpreter (as in importing), where its exception is
+    lost.
+    """
     if ignored.exc_type is KeyboardInterrupt:
         start_new_thread(_send, ())
     else:
@@ -43,7 +45,9 @@ def _send() -> None:
 
 
 def _leave() -> None:
-    """Ends the process: no clean-up, which is for what was opened, and no exception, which importing code may catch."""
+    """Ends the process without clean-up, as nothing is open, and without an exception, which importing code could
+    catch.
+    """
     try:  # noqa: SIM105 (contextlib would have to be imported)
         os.write(2, b"mirotwin: interrupted\n")
     except OSError:  # stderr is closed

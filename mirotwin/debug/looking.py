@@ -1,4 +1,4 @@
-"""The verbs that look: at the stack, values, memory, instructions and the source. They move nothing."""
+"""The verbs that show the stack, values, memory, instructions and the source. They do not move in the run."""
 
 from __future__ import annotations
 
@@ -19,7 +19,7 @@ from mirotwin.debug.symbols import SIZES
 
 LINES_AROUND = 5
 SHOWN_REGISTERS = (*REGISTERS, "tick", "cycle")
-"""Those of `info registers`."""
+"""The registers that `info registers` shows."""
 _UNITS = {"b": 1, "h": 2, "w": 4, "g": 8}
 _EXAMINE = re.compile(r"([0-9]{0,5})([a-z]{0,2})")
 _ROW_BYTES = {1: 8, 2: 16, 4: 16, 8: 16}
@@ -28,7 +28,10 @@ _ROW_BYTES = {1: 8, 2: 16, 4: 16, 8: 16}
 
 
 def where(session: Session, rest: str) -> None:
-    """The functions under way; N: the innermost ones of them. Of a stack that is out of step what is over."""
+    """Prints the active functions; N: the innermost N only.
+
+    If the stack is out of step, also the surplus or missing bytes.
+    """
     unwinder, cpu = session.symbols.unwinder, session.debugger.cpu
     first, _ = session.symbols.image.symbols.stack
     odd = unwinder.out_of_step(cpu, first - 1)
@@ -55,7 +58,7 @@ def where(session: Session, rest: str) -> None:
 
 
 def show_frames(session: Session, frames: list[StackFrame], chosen: int = -1, most: int = 1000) -> None:
-    """One line a frame, the innermost first."""
+    """Prints one line a frame, the innermost first."""
     for index, frame in enumerate(frames[:most]):
         how = "  <- interrupt" if frame.by_interrupt else ""
         place = session.symbols.place(frame.place)
@@ -103,7 +106,10 @@ def show(session: Session, rest: str, how: str = "") -> None:
 
 
 def display(session: Session, rest: str, how: str = "") -> None:
-    """At each stop; alone: now. With a number or `i` and `s` in the form it is what `x` shows."""
+    """Shows values at each stop; without an argument, now.
+
+    With a number or `i` and `s` in the form it shows the same as `x`.
+    """
     if not rest:
         session.show_displays()
         return
@@ -133,7 +139,7 @@ def undisplay(session: Session, rest: str) -> None:
 
 
 def examine(session: Session, rest: str, how: str = "") -> None:
-    """`x/8i PLACE`, `x/16xb PLACE`; alone it goes on behind what it showed last."""
+    """`x/8i PLACE`, `x/16xb PLACE`; without an argument it continues behind the last shown address."""
     session.examined = wanted = _wanted(session, rest, how)
     for line in _examined(session, wanted):
         session.tell(line)
@@ -358,4 +364,4 @@ INFO: dict[str, Callable[[Session, str], None]] = {
     "stack": where,
     "watchpoints": lambda session, rest: tell_all(session),
 }
-"""By what `info` is asked for; where several begin alike, the first is meant."""
+"""Argument of `info` -> handler; for an ambiguous beginning the first entry is used."""

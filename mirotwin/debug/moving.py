@@ -64,7 +64,7 @@ def until(session: Session, rest: str) -> None:
 
 
 def _addresses(session: Session, rest: str) -> list[int] | None:
-    """Those of a line or a function; None for what is neither."""
+    """The addresses of a line or a function; None for other text."""
     symbol = session.symbols.image.symbols.find(rest)
     if rest.isdecimal() or rest[:1] == "*" or (symbol is not None and symbol.space == "code"):
         return session.symbols.at(session.place(rest))[0]
@@ -95,7 +95,7 @@ def _event(session: Session, rest: str) -> str:
 
 
 def _literal(text: str) -> bool | float | str:
-    """A number, true or false as in a scenario file; all else, and what stands in quotes, is a text."""
+    """Parses a number, true or false as in a scenario file; other text and quoted text is a string."""
     with suppress(msgspec.DecodeError):
         value = msgspec.json.decode(text)
         return value if isinstance(value, bool | int | float | str) else text

@@ -1,6 +1,7 @@
-"""What the verbs of the debugger work on: where it stands, the selected frame, and the lines that came of a command.
+"""The state that the debugger's verbs work on: the present place, the selected frame, and the output of the last
+command.
 
-What it prints of a moment is a time that `goto` takes, why it stopped, the place, and the C line or the instruction.
+At a stop it prints the time (as `goto` takes it), the reason of the stop, the place, and the C line or the instruction.
 """
 
 from __future__ import annotations
@@ -17,9 +18,8 @@ from mirotwin.debug.symbols import Moment
 
 
 class Session:
-    """One user. `lines`: what came of the last command; `why`: why it stopped, "" where it did not move.
-
-    `displays`: what is shown at each stop, by number; `examined`: where `x` goes on.
+    """A session of one user. `lines`: output of the last command; `why`: reason of the stop, "" if it did not move.
+    `displays`: number -> expression shown at each stop; `examined`: where `x` continues.
     """
 
     def __init__(self, debugger: Debugger) -> None:
@@ -35,7 +35,10 @@ class Session:
         self.examined: Examined | None = None
 
     def say(self, why: str, instruction: bool = False) -> None:
-        """Shows the output of logs, where it stands and why, and the displays. `instruction`: not the C line."""
+        """Prints log output, the place, the reason `why` of the stop, and the displays.
+
+        `instruction`: print the instruction, not the C line.
+        """
         self.frame, self.why = 0, why
         for cycle, core, text, address in self.debugger.told:
             self.tell(f"{self.time(cycle * CYCLE_TICKS, core)}{self.symbols.place(address)}: {text}")
@@ -50,7 +53,7 @@ class Session:
         self.show_displays()
 
     def show_displays(self) -> None:
-        """One without a value here says why."""
+        """Prints all displays; for one without a value here, the reason."""
         for number, (text, show) in self.displays.items():
             try:
                 shown = show()
@@ -82,7 +85,7 @@ class Session:
         return self.symbols.line(main.address) if line is None and main is not None else line
 
     def place(self, text: str) -> str:
-        """`147` is a line of the file that it stands in; `*0x123` and `*main` are addresses."""
+        """Completes a place: `147` is a line of the present file; `*0x123` and `*main` are addresses."""
         if text[:1] == "*":
             return text[1:].strip()
         line = self.line_here() if text.isdecimal() else None
@@ -90,7 +93,7 @@ class Session:
 
 
 class Examined:
-    """What `x` was asked for last: so many units of a form, from a memory; `address` is where the next one begins."""
+    """The last arguments of `x`: number of units, form and memory; `address`: of the next unit."""
 
     def __init__(self) -> None:
         self.count, self.form, self.size = 1, "x", 1

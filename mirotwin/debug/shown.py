@@ -29,7 +29,7 @@ def lines_of(name: str, value: Value, form: str = "") -> Iterator[str]:
 
 
 def shown(value: Value, form: str = "") -> str:
-    """What it holds, as one reads it: bytes of a text as a text, with `form` as that letter asks."""
+    """The content of a value as text: the bytes of a string as a string; `form`: the format letter."""
     if form not in ("", *FORMS) or form == "i":
         raise NoValue(f"/{form} is no form", f"give one of {', '.join(FORMS)}")
     text = text_in(value, always=form == "s")
@@ -101,7 +101,7 @@ def as_text(data: bytes, always: bool) -> str | None:
 
 
 def _size(value: Value, whole: Any) -> int:
-    """Bytes of the number that it is, or of those that it is made of; of one without a type as many as it needs."""
+    """Size of a number, or of the elements of a value, in bytes; without a type as many bytes as the number needs."""
     kind = value.kind
     while kind is not None and kind.kind == "array" and kind.element is not None:
         kind = kind.element

@@ -1,4 +1,4 @@
-"""What is debugged: SUBJECT and the options that say how it runs, opened as a timeline with its symbols."""
+"""The subject of a debug session: SUBJECT and the options of its run, opened as a timeline with symbols."""
 
 from __future__ import annotations
 
@@ -40,7 +40,7 @@ from mirotwin.verify.steps.reading import steps_in
 
 
 class DebugSubject(SubjectOptions, frozen=True, kw_only=True):
-    """What is debugged, from where on, and where its C files are."""
+    """The subject, the start of the session, and the folder of its C files."""
 
     subject: Annotated[str, Argument("[SUBJECT]", str)] = ""
     at: Annotated[Time | None, AT.saying("Stand there first: 1.5s, 20ms or 48000t.")] = None
@@ -83,8 +83,8 @@ def open_subject(
 ) -> tuple[Debugger, list[str], str]:
     """A debugger at the start, at `--at`, or at the failed check of a case. Raises BadInput.
 
-    `interrupted` is called between two pieces of a run; true ends it where it is.
-    With it what there is to know before anything is asked, and why it stands where it does.
+    `interrupted` is called between two pieces of a run; true ends it where it is. Also returns notes to print first,
+    and the reason why it stands at this place.
     """
     subject = options.subject
     if not subject:
@@ -124,7 +124,7 @@ def open_subject(
 
 
 def _file_below(folder: str) -> str:
-    """What there is to debug in a folder: a recording, a case, or the only case in a folder below it."""
+    """The file to debug in a folder: a recording, a case, or the only case in a folder below it."""
     path = file_in(folder, (*RECORDINGS, *CASES))
     if path != folder:
         return path
@@ -136,9 +136,10 @@ def _file_below(folder: str) -> str:
 
 
 def _open_steps(options: DebugSubject) -> tuple[InspectedRun, list[str], int] | None:
-    """The case of a scenario whose steps fail, what failed, and its tick (else -1); None for any other subject.
+    """The case of a scenario with a failed step, the failure, and its tick; the tick is -1 if all steps passed.
 
-    Of robots also the input of steps that pass: nothing else can repeat it.
+    None for any other subject. For robots a case is returned also if all steps pass: nothing else can repeat the steps'
+    input.
     """
     if not options.subject.endswith(".toml") or is_board(options.subject) or options.resume is not None:
         return None
@@ -182,7 +183,7 @@ def _newer_sources(symbols: Symbols) -> list[str]:
 
 
 def _judged(timeline: Timeline, run: InspectedRun, job: Job) -> Result:
-    """What the check of a case says this time."""
+    """The result of the case's check in this run."""
     if job.alone:  # its checks look at moments of their own, at which the timeline does not stop
         result = job.judge_case()
         ends = (run.end_tick or 0, *(failure.tick for failure in result.failures))

@@ -1,4 +1,4 @@
-"""A firmware as its debugger knows it: lines and addresses, functions, and what names mean at a moment of a run."""
+"""The debugger's view of a firmware: lines and addresses, functions, and the values of names at a moment of a run."""
 
 from __future__ import annotations
 
@@ -46,7 +46,7 @@ _CHIP = {
 
 
 class Symbols:
-    """Of one image. `known`: names, for completion and remedies, with `more` of them.
+    """Symbols of one image. `known`: names for completion and remedies, including `more`.
 
     Raises ImageError for debug files of another image.
     """
@@ -78,21 +78,20 @@ class Symbols:
         return self.names.function(address)[1].removeprefix("_")
 
     def place(self, address: int) -> str:
-        """`failsafe.c:146 in failsafe_tick`, or the address and the symbol where no line is known."""
+        """`failsafe.c:146 in failsafe_tick`; the address and the symbol if no line is known."""
         line = self.line(address)
         if line is None:
             return f"{address:#06x} in {self.names.place(address)}"
         return f"{AnyPath(line.file).name}:{line.line} in {self.function(address)}"
 
     def entry(self, address: int) -> int:
-        """Where the function of the instruction begins: one of C may have names within it."""
+        """First address of the function around an instruction; a C function may contain further names."""
         function = self.debug.function_at(address)
         return self.names.function(address)[0] if function is None else function.first
 
     def at_line(self, file: str, line: int) -> tuple[list[int], SourceLine]:
-        """Where the code of a line begins, in each function that has some, or that of the next line that has any.
-
-        Raises BadInput.
+        """First addresses of a line's code, one for each function with such code; of the next line with code if it has
+        none. Raises BadInput.
         """
         name = AnyPath(file).name
         own = [(place, address) for address, place in self.debug.lines if AnyPath(place.file).name == name]
@@ -114,7 +113,7 @@ class Symbols:
         return sorted(firsts.values()), place
 
     def at(self, text: str) -> tuple[list[int], SourceLine | None]:
-        """What `FILE:LINE`, a symbol or an address means, and its line. Raises BadInput."""
+        """The addresses of `FILE:LINE`, a symbol or an address, and the line. Raises BadInput."""
         file, colon, line = text.rpartition(":")
         if colon and line.isdecimal() and len(line) < 8:
             return self.at_line(file, int(line))
@@ -122,7 +121,7 @@ class Symbols:
         return [address], self.line(address)
 
     def local_places(self, function: Function) -> LocalPlaces:
-        """Where the local variables of a function are."""
+        """The places of a function's local variables."""
         if function.first not in self._places:
             self._places[function.first] = LocalPlaces(
                 self.image, self.debug, self.blocks, self.variables, self._callees, function
@@ -136,7 +135,7 @@ class Symbols:
 
 
 class Moment:
-    """What names mean where a processor stands, in one of the functions under way; 0 is the innermost one."""
+    """Values of names at the processor's present place, in one of the active functions; 0 is the innermost one."""
 
     def __init__(self, symbols: Symbols, core: Core, frame: int = 0) -> None:
         self.symbols = symbols
@@ -148,7 +147,7 @@ class Moment:
         return self.symbols.unwinder.frames(self.core.cpu)
 
     def find(self, name: str, module: str) -> Value:
-        """What a name means; `module`: the file that is named before it, if any. Raises NoValue."""
+        """The value of a name; `module`: the file named before it, "" if none. Raises NoValue."""
         key = (self.pc, name, module)
         meaning = self.symbols.meanings.get(key)
         if (
@@ -158,7 +157,7 @@ class Moment:
         return meaning(self)
 
     def _meaning(self, name: str, module: str) -> Meaning:
-        """How the value of a name is found at this instruction. Raises NoValue for a name that means nothing."""
+        """A function that reads a name's value at this instruction. Raises NoValue for an unknown name."""
         if not module and (local := self._local_meaning(name)):
             return local
         if variable := self._variable(name, module):
@@ -183,7 +182,7 @@ class Moment:
         return value
 
     def _placing(self, variable: Variable) -> Meaning:
-        """`placed` for this instruction: of most variables the place is all there is to it."""
+        """`placed` for this instruction; for most variables the place is the same everywhere."""
         places = self._places()
         own = places is not None and variable.scope == places.name
         shared = any(first <= variable.address < end for first, end in self.symbols.overlays)
@@ -207,7 +206,7 @@ class Moment:
         return NoValue(f"there is no {name} here", remedy)
 
     def scope_of(self, name: str, module: str) -> str | None:
-        """The file or function of a variable with a place, "" for a register or what only the map names; else None."""
+        """The file or function of a variable with a place; "" for a register or a name of the map only; else None."""
         if variable := self._variable(name, module):
             return variable.scope
         symbol = self.symbols.image.symbols.find(name) if not module else None
@@ -218,7 +217,7 @@ class Moment:
 
     @property
     def _function(self) -> str:
-        """The name of the C function that it stands in, "" outside of these."""
+        """Name of the active C function, "" outside of C functions."""
         places = self._places()
         return "" if places is None else places.name
 
@@ -248,7 +247,7 @@ class Moment:
         return next(iter(near or fitting), None)
 
     def placed(self, variable: Variable) -> Value:
-        """What a variable with a place means. Raises NoValue where others use the place."""
+        """The value of a variable with a place. Raises NoValue if other variables use the place now."""
         if variable.space == "iram" and variable.scope:
             self._refuse_shared(variable.name, variable.address, variable.scope)
         places = self._places()
@@ -268,7 +267,7 @@ class Moment:
                 raise NoValue(f"{name} is not live: {why}")
 
     def locals(self) -> dict[str, Callable[[], Value]]:
-        """Of the function that it stands in; what is not live raises NoValue when it is read."""
+        """Local variables of the active function; reading one that is not live raises NoValue."""
         places = self._places()
         if places is None:
             return {}
@@ -277,7 +276,7 @@ class Moment:
         return in_memory | {local.name: partial(self._local, places, local) for local in inner_last}
 
     def _local_meaning(self, name: str) -> Meaning | None:
-        """How the value of a local variable is found; None for a name that is none here."""
+        """A function that reads a local variable's value; None if there is no local variable of this name."""
         places = self._places()
         if places is None:
             return None
@@ -289,14 +288,14 @@ class Moment:
         return None if placed is None else lambda moment: moment.placed(placed)
 
     def _places(self) -> LocalPlaces | None:
-        """Of the function that it stands in."""
+        """Places of the active function's local variables; None outside of C functions."""
         function = self.symbols.debug.function_at(self.pc)
         return None if function is None else self.symbols.local_places(function)
 
     def variables(self, scope: str, module: str = "") -> dict[str, Callable[[], Value]]:
-        """The variables of a function or a file ("": of all) that have a place in memory, by name.
+        """The variables of a function or a file ("": of all) with a place in memory, by name.
 
-        `module`: the file whose function is meant where several have one of this name.
+        `module`: the file of the function, if several have one of this name.
         """
         every = (variable for _, each in sorted(self.symbols.variables.by_name.items()) for variable in each)
         own = sorted(
@@ -347,7 +346,10 @@ class Moment:
     def _in_registers(
         self, places: LocalPlaces, name: str, kind: CType, where: tuple[int, ...] | str, remedy: str = ""
     ) -> Value:
-        """`where`: its bytes, or why they are not known. Raises NoValue for that."""
+        """A value in registers.
+
+        `where`: numbers of its bytes, or the reason why they are unknown, which raises NoValue.
+        """
         cpu = self.core.cpu
         if (
             not isinstance(where, str)
@@ -428,7 +430,7 @@ class Moment:
 
 
 Meaning = Callable[[Moment], Value]
-"""How a name becomes a value where a processor stands."""
+"""A function from a moment to a name's value."""
 _NUMBERS: dict[str, Callable[[Moment], int]] = {
     "PC": lambda moment: moment.pc,
     "DPTR": lambda moment: moment.core.cpu.dptr,
@@ -438,7 +440,7 @@ _NUMBERS: dict[str, Callable[[Moment], int]] = {
 
 
 def _chip(chip: Lm629, path: str = "") -> Value:
-    """What one looks at in a chip, or in a part of it."""
+    """The debugger's view of a chip, or of a part of it."""
     if path not in _CHIP:
         return Value(number=int(attrgetter(path)(chip)))
     paths = {name: f"{path}.{name}".lstrip(".") for name in _CHIP[path].split()}

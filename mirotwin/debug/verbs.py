@@ -23,9 +23,8 @@ Completes = Literal["", "places", "expressions", "conditions", "verbs", "infos"]
 
 
 class Verb(NamedTuple):
-    """`does` takes the session, what follows and, where it `has_form`, the letters after a slash.
-
-    `completes`: what its argument is made of. `repeats`: an empty line does it again.
+    """`does` takes the session, the rest of the line and, if `has_form`, the letters after a slash. `completes`: the
+    kind of names that complete its argument. `repeats`: an empty line repeats the verb.
     """
 
     name: str
@@ -116,7 +115,7 @@ VERBS = (
     Verb("help", "h ?", "[VERB]", "this list, or what VERB takes", _help, "verbs"),
     Verb("quit", "q exit", "", "leave", _quit),
 )  # fmt: skip
-"""Where several begin alike, the first is meant by their beginning."""
+"""All verbs; an ambiguous beginning means the first one in this order."""
 _BY_NAME = {name: verb for verb in VERBS for name in verb.names}
 _COMMAND = re.compile(r"(?:r\s+(?=[a-z]))?[A-Za-z?][A-Za-z-]*")
 _NOT_OF_A_RUN = ("set", "call", "jump", "return", "load", "kill")
@@ -151,7 +150,7 @@ def is_command(line: str, variables: Any) -> bool:
 
 
 def do(session: Session, line: str) -> Verb | None:
-    """Runs one line; what came of it is in the session. None for an empty one. Raises BadInput."""
+    """Runs one line; the output is in the session. Returns None for an empty line. Raises BadInput."""
     session.lines.clear()
     session.why = ""
     line = line.strip()
@@ -173,7 +172,7 @@ def do(session: Session, line: str) -> Verb | None:
 
 
 def completions(session: Session, line: str) -> tuple[int, list[str]]:
-    """Where the word that is begun at the end of a line begins, and what it may become."""
+    """Index at which the last word of a line begins, and its completions."""
     begun = _COMMAND.match(line)
     if begun is None or begun.end() == len(line):
         word = line.split(" ")[-1]

@@ -20,7 +20,7 @@ Message = dict[str, Any]
 
 
 class Request(msgspec.Struct):
-    """What each message of a client has."""
+    """Fields of every message from a client."""
 
     seq: int
     type: str
@@ -39,9 +39,9 @@ class Wire:
         threading.Thread(target=self._read_all, daemon=True).start()
 
     def next(self, wait: bool = True) -> Message | None:
-        """The next message; None at the end of input, and (without `wait`) an empty one where none is there yet.
+        """The next message; None at the end of input. Without `wait` an empty message if none has arrived.
 
-        Raises BadInput for what is no message, again and again: nothing is read after it.
+        Raises BadInput for malformed input, and again on each later call: nothing is read after it.
         """
         try:
             message = self.came.get(block=wait)
@@ -54,7 +54,7 @@ class Wire:
         return message
 
     def send(self, message: Message) -> None:
-        """Leaves out what is None. Raises OSError where the client has gone."""
+        """Sends a message without its None fields. Raises OSError if the client has disconnected."""
         self.sequence += 1
         data = msgspec.json.encode({"seq": self.sequence, **_given(message)})
         self.sink.write(b"Content-Length: %d\r\n\r\n%b" % (len(data), data))

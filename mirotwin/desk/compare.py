@@ -1,9 +1,10 @@
-"""What a robot at a port answers beside what its twin answers to the same characters at the same ticks.
+"""Compares a robot's answers at a port with its twin's answers to the same characters at the same ticks.
 
 An answer comes `delay` after the twin's: radio, adapter, operating system and scheduling. The shortest delay of a talk
-is what the way costs, and is taken off all ticks. What the answers nearby take longer is how late the frames between
-them may have come to the robot: what that explains is no difference. Positions, `accepted` and `rejected` are compared
-by how they change from one answer to the next: a robot on the desk was switched on some time ago.
+is the delay of the path, and is subtracted from all ticks. The extra delay of nearby answers bounds how late the frames
+between them may have reached the robot; deviations within this bound are no differences. Positions, `accepted` and
+`rejected` are compared by their change from one answer to the next, because a robot on the desk was switched on
+earlier.
 """
 
 from __future__ import annotations
@@ -37,25 +38,29 @@ WITHIN_TICKS = 20 * TICKS_PER_MS
 """A little more than the 16 ms for which a USB adapter may keep a character."""
 ANSWERS = CompareRule(kind="answers", within_ticks=WITHIN_TICKS)
 TOGETHER_TICKS = 500 * TICKS_PER_MS
-"""Answers with the same slot and number that are farther apart are to different questions."""
+"""Largest distance of answers to the same question; the same slot and number farther apart belong to different
+questions.
+"""
 EARLY_TICKS = 5 * TICKS_PER_MS
-"""By so much a robot with a fast crystal may be earlier than its twin."""
+"""A robot with a fast crystal may be earlier than its twin by this much."""
 LIMITS_TICKS = (FAILSAFE_STOP_TICKS, FRESH_AGAIN_TICKS, FAILSAFE_OFF_TICKS)
 GAP_TICKS = 2 * TICKS_PER_MS
-"""So near to a limit of time, a robot and its twin may judge either way: where they count from and what they round."""
+"""Within this distance of a time limit a robot and its twin may decide either way: start of counting and rounding
+differ.
+"""
 STATUS = 0xA2
-"""Command error, excessive error, motor off: bits of an LM629's status that do not depend on what was before."""
+"""Command error, excessive error, motor off: status bits of an LM629 that do not depend on earlier events."""
 STATUS_AT_START = 0x22
 """`STATUS` without motor off, for a question that starts motors: the sample after it may precede the answer."""
 SLOWING_TICKS = CONTROL_PERIOD_TICKS * 8
-"""A wheel may go as fast as the host requested so long ago: from 1.46 m/s it comes to rest in 243 ms."""
+"""A wheel's speed is bounded by the largest requested speed in this time: from 1.46 m/s it comes to rest in 243 ms."""
 NEAR = 2
-"""Answers before and after a window that tell how late frames without an answer were."""
+"""Answers before and after a window that bound how late frames without an answer were."""
 
 
 class PortComparison(msgspec.Struct, frozen=True):
     """`robots`: the answers by slot; `unsure_ms`: how well their times are known. `silent`: slots of the twin's robots
-    that do not answer at the port; `not_judged`: values that time left open.
+    that do not answer at the port; `not_judged`: values that timing uncertainty leaves open.
     """
 
     robots: dict[int, list[Pair]]
@@ -196,7 +201,7 @@ def _judged(
 
 
 def _went(name: str, modulus: int, least: int) -> Callable[[TelemetryFrame, TelemetryFrame], int]:
-    """By how much a value that wraps went on."""
+    """A function for the increase of a wrapping value from one answer to the next."""
     return lambda earlier, later: (getattr(later, name) - getattr(earlier, name) - least) % modulus + least
 
 
@@ -215,4 +220,7 @@ FIELDS: dict[str, tuple[Callable[[TelemetryFrame, TelemetryFrame], int], int | N
     "left moved": (_went("position_left", 1 << 16, -1 << 15), 0),
     "right moved": (_went("position_right", 1 << 16, -1 << 15), 1),
 }
-"""What is compared of an answer and the one before: a wheel's position within counts, all else has to be equal."""
+"""Compared field -> its change between two answers, and tolerance.
+
+A wheel's position may differ by counts, all else must be equal.
+"""

@@ -1,11 +1,11 @@
-"""What may be sent to a robot that can hurt: nothing that moves it unless that is allowed, and nothing too fast.
+"""Guards a real robot, which can hurt: refuses motion unless it is allowed, and speeds above the limit.
 
 A robot takes the last 17 characters for a frame (25 in a network of five) if they begin with the sync and their CRC is
-good; which pauses it refuses, and which frames it has lost, this side of the radio does not know. So every window of
-both lengths is judged, across transmissions, whatever the pauses and whatever frames it overlaps. Without
-`--allow-motion` such a frame may hold nothing but zeros, and the slot of a ping: velocities 0, no gains, no
-acceleration, whatever its type. A window with a bad CRC is no frame: receivers notice any 1 to 4 wrong bits. A robot
-whose firmware takes it may make something else of it; no guard can know that.
+good. The PC does not know which pauses the robot refuses and which frames it has lost. So every window of both lengths
+is checked, across transmissions, pauses and overlapping frames. Without `--allow-motion` the payload of such a frame,
+of any type, must be zeros except for the slot of a ping: velocities 0, no gains, no acceleration. A window with a bad
+CRC is no frame: receivers notice any 1 to 4 wrong bits. A robot whose firmware accepts it may misread it; no guard can
+prevent that.
 """
 
 from __future__ import annotations
@@ -24,7 +24,7 @@ from mirotwin.shell.command import Option, Options
 from mirotwin.shell.options import FiniteNumber, PathType
 
 MAX_SPEED_M_S = 0.5
-"""Of each wheel, unless another limit is given. A third of what the robot can do."""
+"""Limit of each wheel, in m/s, unless another one is given. A third of the robot's top speed."""
 STOP_FRAMES = 3
 """With the numbers that follow; further ones are fresh after any other number (`Guard.stop_frames`)."""
 LONGEST = max(form.size for form in DOWNLINK.values())
@@ -40,7 +40,7 @@ _SPEED = FiniteNumber(0.0, WHEELS.limit_m_s)
 
 
 class DeskOptions(Options, frozen=True, kw_only=True):
-    """Where a robot is, and what may be done to it. `port` None: no robot, only its twin."""
+    """Address of a robot, and permissions. `port` None: no robot, only its twin."""
 
     HEADING = "A robot at a port"
     port: Annotated[str | None, Option(type=_URL, metavar="URL", help=_WHERE)] = None
@@ -73,7 +73,7 @@ class FrameSent(NamedTuple):
         return [(left / WHEELS.units_per_m_s, right / WHEELS.units_per_m_s) for left, right in words]
 
     def moves(self) -> str:
-        """What it does to a robot other than letting it stand with its gains, "" for nothing."""
+        """The effect on a robot beyond standing with its gains, in words; "" for none."""
         slot, *rest = self.body[1:]
         if not any(rest) and (not slot or (self.kind == FrameType.SERVICE and slot < self.robots)):
             return ""
@@ -86,7 +86,7 @@ class FrameSent(NamedTuple):
 
 
 def frames_in(wire: bytes, from_end: int = 0) -> Iterator[FrameSent]:
-    """Every window of either layout that is a frame and ends behind `from_end`."""
+    """Yields every window of either layout that is a frame and ends behind `from_end`."""
     for robots, form in DOWNLINK.items():
         start = wire.find(form.sync, max(0, from_end - form.size + 1))
         while 0 <= start <= len(wire) - form.size:
@@ -98,8 +98,9 @@ def frames_in(wire: bytes, from_end: int = 0) -> Iterator[FrameSent]:
 
 
 class Guard:
-    """Checks what is sent to the robots of one port. `last`: by robots in a network, the number of the frame that was
-    sent last, the network spoken to last at the end.
+    """Checks all characters sent to the robots of one port.
+
+    `last`: number of robots in a network -> number of the last sent frame; the network used last is at the end.
     """
 
     def __init__(self, desk: DeskOptions, path: str = "") -> None:
@@ -109,9 +110,9 @@ class Guard:
         self._sent = b""
 
     def check(self, data: bytes, place: str = "") -> list[int]:
-        """Reads what is sent next; the numbers of its frames.
+        """Checks the next characters and returns the numbers of their frames.
 
-        Raises BadInput for what is not allowed, which then counts as not sent.
+        Raises BadInput for forbidden content, which then counts as not sent.
         """
         wire, begun = self._sent + data, len(self._sent)
         frames = sorted(frames_in(wire, begun))
@@ -125,7 +126,7 @@ class Guard:
         return [frame.seq for frame in frames]
 
     def _refusal(self, frame: FrameSent) -> tuple[str, str] | None:
-        """Why it is not sent and what to do, None if it may be sent."""
+        """Reason and remedy of a refusal; None if the frame may be sent."""
         moves, where = frame.moves(), f"(frame {frame.seq}, {frame.robots} robots)"
         if moves and not self.desk.allow_motion:
             remedy = "clear its way or lift its wheels off the ground, then give --allow-motion"
@@ -137,14 +138,14 @@ class Guard:
         return None
 
     def stop_frames(self, unsent: int = 0) -> bytes:
-        """Frames that tell all robots to stand, to networks of every size that was spoken to, the last one first.
+        """Frames that stop all robots, in networks of every size used so far, the last used first.
 
-        The first follow the number that was sent last. The others, in steps of 8, make sure that one is fresh whatever
-        number a robot took last: who jumps in its numbers does not know which that is.
+        The first frames have the numbers after the last sent one. The others, in steps of 8, ensure that one is fresh
+        for every number that a robot may have accepted last; after jumps in the numbers that is unknown.
 
-        `unsent`: so many of the characters sent last may have been taken back. Wherever they end, no window over what
-        is left of them and the frames' first characters is a frame: other characters stand between if need be, unless
-        that helps with none: then the next stop frame ends what the first one begins.
+        `unsent`: number of the last sent characters that may have been taken back. Wherever they were cut, no window
+        over their rest and the frames' first characters may be a frame; if needed, filler characters go between. If no
+        filler helps, the next stop frame ends the movement that the first one begins.
         """
         steps = [*range(1, STOP_FRAMES + 1), *range(STOP_FRAMES + FRESH_STEPS, SEQ_MODULUS, FRESH_STEPS)]
         frames = b"".join(
@@ -158,7 +159,7 @@ class Guard:
         )
 
     def _is_apart(self, frames: bytes, unsent: int) -> bool:
-        """True if robots find nothing in these characters that moves them, behind any beginning of what was sent."""
+        """True if these characters, behind any cut of the sent ones, contain no frame that moves a robot."""
         first = frames[: LONGEST - 1]
         ends = range(max(0, len(self._sent) - unsent), len(self._sent) + 1)
         across = (

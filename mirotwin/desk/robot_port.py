@@ -1,12 +1,13 @@
-"""Robots behind a serial port of this PC as a `Machine`: what a PC can do with them and see of them.
+"""Robots behind a serial port of this PC as a `Machine`, within the limits of a PC.
 
     with RobotPort(desk, scenario) as port:      opened; at the end, whatever happened: stop frames
-        port.greet()                             who is there; tick 0 is now
+        port.greet()                             finds the robots; tick 0 is now
         port.inject(data)                        sends what the guard allows; tick of the first start bit
         port.run_until(Answer(slot=0), within=ms(80))
 
 Ticks are 24 in a microsecond of the wall clock (`miro://` without `realtime` has its own), and an event is known when
-its characters are there. What needs a robot's inside, or a switch on it, raises NotObservable: `LACKS` says why.
+its characters have arrived. Operations that need a robot's inside, or a switch on it, raise NotObservable with the
+reason in `LACKS`.
 """
 
 from __future__ import annotations
@@ -54,21 +55,23 @@ LACKS: dict[Feature, str] = {
     "switch": "on a port: only a twin has such a switch",
     "save": "on a port: only a twin can be saved",
 }
-"""What a PC can neither do nor see, and why."""
+"""Operation that a PC cannot do or observe -> reason."""
 BAUD = 9600
 BLOCKED_S = 1.0
 """A port that takes no characters for so long is blocked: its buffers are full, and no program reads them."""
 LOOK_S = 0.001
-"""How often a port is looked at that cannot be waited for (`rfc2217://`)."""
+"""Polling interval of a port that cannot be waited for (`rfc2217://`), in seconds."""
 READ_BYTES = 4096
 BURST_BYTES = 1 << 16
-"""So many may have waited in buffers of the system before the port was read."""
+"""Bytes that may wait in the system's buffers before the port is read."""
 LEAST_CHARACTER_TICKS = character_ticks(UP) * 15 // 16
-"""No receiver of 9600 baud takes shorter characters; what comes faster for long is no robot, and is dropped."""
+"""No receiver of 9600 baud accepts shorter characters; a longer stream of faster ones comes from no robot, and is
+dropped.
+"""
 CUT_TICKS = TICKS_PER_SECOND // 10
-"""What came so long before is no part of an answer that goes on now; USB adapters keep characters for 16 ms."""
+"""Characters older than this do not belong to the present answer; USB adapters hold characters for 16 ms."""
 PORT_ERRORS: tuple[type[Exception], ...] = (OSError,)
-"""What pyserial raises for a port that is gone: its own errors are OSErrors, that of termios is none."""
+"""Exceptions of pyserial for a lost port: its own errors are OSErrors, a termios error is not."""
 with suppress(ImportError):  # Windows has none
     import termios
 
@@ -78,13 +81,13 @@ REOPENINGS = 3
 BOOT_TICKS = TICKS_PER_SECOND // 10
 """A twin that is switched on at tick 0 is up by then."""
 ROUNDS = 4
-"""How often each robot is requested to identify itself."""
+"""Requests to each robot to identify itself."""
 APART = 32
-"""Numbers between the last question of the greeting and what follows it."""
+"""Distance in numbers between the last question of the greeting and the next frame."""
 PAUSE_TICKS = FRESH_AGAIN_TICKS + TICKS_PER_SECOND // 10
 """After the greeting: after so long a silence any other number is fresh."""
 ADAPTER_TICKS = TICKS_PER_SECOND // 10
-"""So much may wait in an adapter when the port's driver has sent all."""
+"""Largest content of an adapter's buffer after the port's driver has sent everything, as a time."""
 AFTER_TICKS = TICKS_PER_SECOND // 5
 """An answer that comes later than this is none."""
 PIECE_BYTES = 200
@@ -125,14 +128,13 @@ class PortNetwork(msgspec.Struct, frozen=True):
 
 
 class RobotPort:
-    """The robots at `desk.port`, in a network and for a duration as in `scenario`. `name`: of what is sent, in errors.
-    `note`: gets what else to say, a line each.
-
-    `wire`: what went out, and whole answers and the characters between them, as they came; its ticks count from the
-    opening, all others from the greeting. `late_ticks`: how late each transmission of a schedule was. `slots`: who
-    answers; `delays`: from each question since the greeting began to its whole answer, in ticks.
-    `accepted` and `rejected` of answers count from the greeting, as from a power-on. `prompt`: with real-time priority.
-    `dropped`: characters that came faster than a line carries them.
+    """The robots at `desk.port`, with the network and the duration of `scenario`. `name`: source of the sent
+    characters, for errors. `note`: gets remarks, a line each. `wire`: characters sent, complete answers, and the
+    characters between them, in order of arrival; its ticks count from the opening, all others from the greeting.
+    `late_ticks`: lateness of each transmission of a schedule. `slots`: robots that answer; `delays`: ticks from each
+    question since the begin of the greeting to the end of its answer. `accepted` and `rejected` of answers count from
+    the greeting, as from a power-on. `prompt`: run with real-time priority. `dropped`: number of characters that came
+    faster than the line can carry.
     """
 
     lacks = LACKS
@@ -231,7 +233,9 @@ class RobotPort:
         self._take(self._read(max(0, tick - self.tick)))
 
     def begin_period(self) -> None:
-        """For `Waits`, as the next four: time only goes on here, and what came is in the log."""
+        """For `Waits`, like the next four methods: nothing to do, as time cannot go back here and arrivals are in the
+        log.
+        """
 
     def end_period(self) -> None:
         pass
@@ -290,7 +294,9 @@ class RobotPort:
     robot = device
 
     def play(self, sent: Iterable[Transmission], each: Callable[[int], object] = lambda tick: None) -> None:
-        """Sends these at their ticks, and reads meanwhile and a little longer; `each` gets the tick of each end."""
+        """Sends these at their ticks while reading, and reads a little longer; `each` is called with the tick of each
+        end.
+        """
         for transmission in sent:
             for start in range(0, len(transmission.data), PIECE_BYTES):
                 # In pieces: what is in the system's buffer cannot be taken back by `stop`.
@@ -301,7 +307,7 @@ class RobotPort:
         self.run_to(self.earliest_tick() + AFTER_TICKS)
 
     def stop(self) -> None:
-        """Takes back what waits, and tells all robots to stand. A lost port is opened again for it, if it can be."""
+        """Takes back waiting characters and sends stop frames. Reopens a lost port for this if possible."""
         # The adapter may be within a frame: stop frames have to be enough for one to be read whole.
         unsent_ticks = max(0, self.free_tick - self._now) + ADAPTER_TICKS
         frames = self.guard.stop_frames(unsent_ticks // HOST_CHARACTER_TICKS)
@@ -325,9 +331,8 @@ class RobotPort:
     # ---- who is there ------------------------------------------------------------------------------------
 
     def greet(self, sizes: Sequence[int] = (), sent: Iterable[Transmission] = ()) -> int:
-        """Asks who is there, in networks of these sizes (default: the scenario's); the first in which robots answer.
-
-        Then comes silence, after which what is `sent` is fresh. Raises BadInput where no robot answers.
+        """Queries the robots in networks of these sizes (default: the scenario's) and returns the first size with
+        answers. A silence follows, after which `sent` is fresh. Raises BadInput if no robot answers.
         """
         sizes, first = sizes or (self.networks[0].spec.robots,), len(self.wire)
         for robots in sizes:
@@ -370,7 +375,7 @@ class RobotPort:
         return counted if self.delays else {}  # without any, the numbers are those of later questions
 
     def _why_nobody(self, sizes: Sequence[int], first: int) -> tuple[str, str]:
-        """What came instead of answers, and what to do."""
+        """What arrived instead of answers, and a remedy."""
         came = b"".join(sent.data for sent in self.wire[first:] if sent.direction == UP)
         problem = f"no robot of a network of {' or '.join(map(str, sizes))} answers"
         if not came:
@@ -385,7 +390,7 @@ class RobotPort:
     # ---- reading -----------------------------------------------------------------------------------------
 
     def _read(self, wait_ticks: int) -> bytes:
-        """What is there, or is the first to come in this time."""
+        """The available bytes, or the first to arrive within this time."""
         port, wait_s = self._serial, wait_ticks / TICKS_PER_SECOND
         unread = getattr(
             port, "_read_buffer", None
@@ -469,7 +474,7 @@ class RobotPort:
         self.recorder = Recorder(stream, source)
 
     def _record(self, until_tick: int) -> None:
-        """Writes the periods that are over by then: what is broken off is there up to there."""
+        """Writes the periods that end by `until_tick`, so that an interrupted recording is complete up to there."""
         if self.recorder is None:
             return
         # Answers are dated back to their first character: one may begin before what was sent while it came.
@@ -501,7 +506,7 @@ def port_for_test(desk: DeskOptions, scenario: Scenario, name: str, note: Note) 
 
 
 def _check_address(url: str, scheme: str) -> None:
-    """Refuses a network address without a port: what pyserial says of it is a fault of its own."""
+    """Refuses a network address without a port number, for which pyserial's own message is misleading."""
     with suppress(ValueError):  # letters, or beyond 65535
         if scheme not in ("socket", "rfc2217") or urlsplit(url).port is not None:
             return
