@@ -156,7 +156,9 @@ def _check_outputs(options: CalibrateOptions) -> None:
 
 
 def _of_scenario(name: str, initial: CameraParameters | None, options: CalibrateOptions) -> _Found:
-    """Points, calibration and perhaps colours of a scenario's camera. Raises BadInput for a camera without a picture.
+    """Points, calibration and perhaps colours of a scenario's camera.
+
+    Raises BadInput for a camera without a picture.
     """
     colours = options.colours_out is not None
     text = load(name, options.settings)

@@ -19,8 +19,7 @@ from mirotwin.campaign.worker import RunOutcome, Work, work
 from mirotwin.campaign.workers import Workers
 
 SPREAD = 4096
-"""Largest distance between the first run without an outcome and the last submitted run, in runs: so many rows may wait.
-"""
+"""Largest distance between the first run without an outcome and the last submitted run; limits waiting rows."""
 ISOLATED_RETRIES = 2
 """Retries, alone in the executor, of a job that was under way when a worker died: a suspect."""
 MAX_DEAD_EXECUTORS = 20
@@ -102,7 +101,9 @@ class Drive:
             yield from self._broken(lost)
 
     def _broken(self, lost: list[int]) -> list[RunOutcome]:
-        """Replaces the broken executor and queues its jobs again. Returns error outcomes of jobs without retries left.
+        """Replaces the broken executor and queues its jobs again.
+
+        Returns error outcomes of jobs without retries left.
         """
         lost += self._pending.values()  # a pool that is broken gives no more outcomes, whether done or not
         self._pending.clear()

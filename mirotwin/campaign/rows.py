@@ -42,8 +42,7 @@ class Arm(msgspec.Struct, frozen=True):
         return label_of(self.factors)
 
     def metric_label(self, name: str) -> str:
-        """The metric's label with the runs that its median leaves out: a run that never settles has no settling time.
-        """
+        """The metric's label with the runs that its median leaves out: runs that never settle have no time."""
         if name == SETTLING and self.never_settled:
             return f"{name} ({self.never_settled} of {self.runs} never settle)"
         return name

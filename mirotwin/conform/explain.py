@@ -1,5 +1,4 @@
-"""The timeline of a rule's trial: frames sent and received, commands, answers, and the expectations with their ticks.
-"""
+"""The timeline of a rule's trial: frames sent and received, commands, answers, and expectations with their ticks."""
 
 from __future__ import annotations
 

@@ -45,8 +45,7 @@ _UNHEARD = 4
 
 
 def why_deaf(network: int, image: Image, seed: int) -> str:
-    """The reaction of the robot in this topology of `BOTH`, if it does not obey plain frames; "" if none is recognised.
-    """
+    """The wrong reaction of the robot in this topology of `BOTH` to plain frames; "" if none is recognised."""
     topology = BOTH[network]
     tried: list[tuple[str, Frame]] = []
 

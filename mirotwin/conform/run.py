@@ -79,8 +79,7 @@ def failure_text(failure: Failure) -> str:
 
 
 def case_names(rule: Rule) -> tuple[str, str, str]:
-    """Names of the files that a rule may leave: its failure, a firmware fault in its trial, and the sanitizer's trial.
-    """
+    """Names of the files that a rule may leave: its failure, a firmware fault, and the sanitizer's trial."""
     return f"{rule.id}{SUFFIX}", f"{rule.id}-fault{SUFFIX}", f"{rule.id}-sanitized{SUFFIX}"
 
 

@@ -86,7 +86,9 @@ def _error(rows: Sequence[RunRow]) -> str:
 
 
 def _of_cases(cases: Sequence[bool | None], some: str = PART) -> str:
-    """The verdict on a claim about all cases; `some`: the verdict if it holds in some only. A case None is not judged.
+    """The verdict on a claim about all cases; `some`: the verdict if it holds in some only.
+
+    A case None is not judged.
     """
     if all(case is None for case in cases):
         return NOT_JUDGED

@@ -117,6 +117,8 @@ def never_settled(rows: Sequence[RunRow]) -> int:
 
 
 def settled(rows: Sequence[RunRow]) -> list[RunRow]:
-    """Runs that were within 3 cm and 0.15 rad for the last second. The errors of other runs only show how far they got.
+    """Runs that were within 3 cm and 0.15 rad for the last second.
+
+    The errors of other runs only show how far they got.
     """
     return [row for row in rows if row.settled]

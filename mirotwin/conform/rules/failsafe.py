@@ -58,8 +58,7 @@ def not_put_off(script: TrialScript) -> None:
 
 
 def _stop_of_a_busy_robot(script: TrialScript) -> None:
-    """One wheel is still stopping and an acceleration waits for it; several syncs in a row come before the next frame.
-    """
+    """One wheel is still stopping and an acceleration waits for it; several syncs come before the next frame."""
     for syncs in (16, 24):
         for _ in range(8):
             script.team(script.same(0, 12000))

@@ -9,8 +9,7 @@ from mirotwin.conform.trial_script import How, TrialScript, ms
 CHAPTER = Chapter("Freshness")
 AGAIN_MS = FRESH_AGAIN_TICKS / TICKS_PER_MS
 NEAR_MS = 0.3
-"""Within this distance of 150 ms a robot may decide either way: three times the error of the shipped firmware. Chosen.
-"""
+"""Within this distance of 150 ms a robot may decide either way. Chosen: three times the shipped firmware's error."""
 
 
 @CHAPTER.rule("P16", FRESHNESS, presupposes="P28", broken="a frame 1 to 8 steps on is not obeyed")
