@@ -152,7 +152,7 @@ class BareOptions(Options, frozen=True, kw_only=True):
 
     @property
     def files(self) -> tuple[str | None, ...]:
-        """What is read, and so must not be written."""
+        """The input files, which must not be written."""
         return (*(path for path in self.stdin if path != STDIN), self.pins, self.board)
 
 
@@ -195,7 +195,7 @@ def make_world(
     live: bool = False,
     seed: int = 0,
 ) -> World:
-    """A world of one board, from the options. `output` gets what it sends; `seed`: of the noise of its parts.
+    """A world of one board, from the options. `output` gets the bytes that it sends; `seed`: of the noise of its parts.
 
     Raises BadInput, and errors of the files read.
     """
@@ -241,20 +241,20 @@ def board_of(world: World) -> EmptyBoard:
 
 
 def terminal_of(world: World) -> Terminal:
-    """What is at the end of its wire."""
+    """The terminal at the end of the board's serial wire."""
     terminal = wire_of(world).terminal
     assert terminal is not None
     return terminal
 
 
 def has_terminal(world: World) -> bool:
-    """True if the world is that of an image, with what the command line sends to it."""
+    """True if the world is a single image whose serial input comes from the command line."""
     line = world.lines[0]
     return isinstance(line, Wire) and line.terminal is not None
 
 
 def ended(world: World, max_cycles: int | None) -> Ended:
-    """Why a world of one board stands where it does."""
+    """The reason why a world of one board has stopped."""
     board = board_of(world)
     if not world.stopped:
         return Ended.PAUSED if max_cycles is None or board.cpu.cycles < max_cycles else Ended.CYCLES
@@ -287,7 +287,7 @@ def _start(image: Image, options: BareOptions) -> int:
 
 
 def _alike(faults: Iterable[FirmwareFault]) -> list[list[FirmwareFault]]:
-    """Those of one kind at one instruction together: a loop has thousands."""
+    """Faults grouped by kind and instruction: a loop has thousands."""
     places: dict[tuple[int, int, str], list[FirmwareFault]] = {}
     for fault in faults:
         places.setdefault((fault.kind, fault.pc, fault.detail), []).append(fault)
@@ -295,7 +295,7 @@ def _alike(faults: Iterable[FirmwareFault]) -> list[list[FirmwareFault]]:
 
 
 def report(world: World, options: BareOptions) -> int:
-    """Says on stderr why a run ended that did not end as planned; returns the exit code."""
+    """Reports on stderr why a run ended early; returns the exit code."""
     board, serial, why = board_of(world), terminal_of(world).input, ended(world, options.max_cycles)
     verdict = "passed"
     left = board.fault_count
@@ -336,13 +336,13 @@ def report(world: World, options: BareOptions) -> int:
 
 
 def stopped_at(world: World) -> str:
-    """Where and when, for people."""
+    """The place and time of the stop, as text."""
     cpu = board_of(world).cpu
     return f"{place_of(cpu.pc, world.image)} after {amount(cpu.cycles, 'machine cycle')}"
 
 
 def _pieces(options: BareOptions, crystal_hz: int) -> tuple[InputPiece, ...]:
-    """What --stdin and its conditions say, in order."""
+    """The pieces of --stdin and their conditions, in order."""
     texts = [text.encode(errors="surrogateescape") for text in options.stdin_when]
     files = len(options.stdin)
     if not files:

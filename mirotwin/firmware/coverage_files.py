@@ -1,4 +1,4 @@
-"""Firmware coverage as a report: what the command line and the pytest plugin make of counts."""
+"""Firmware coverage reports, for the command line and the pytest plugin."""
 
 from __future__ import annotations
 
@@ -42,7 +42,7 @@ def has_listing(image: Image) -> bool:
 
 
 def listing_path(out: Path) -> Path:
-    """Where the listing belongs that goes with the tracefile at `out`."""
+    """Path of the listing that belongs to the tracefile at `out`."""
     return out.with_name(f"{out.name}.lst")
 
 
@@ -58,7 +58,7 @@ def collect(image: Image, counts: Counts, sources: Sources, out: Path | None) ->
 
 
 def is_of_another_image(report: Report, out: Path) -> bool:
-    """True if the listing beside `out` is not the one whose lines `report` counts: their numbers mean other things."""
+    """True if the listing beside `out` is not the one whose lines `report` counts: its line numbers do not fit."""
     beside = listing_path(out)
     if report.listing is None or not beside.exists():
         return False
@@ -76,7 +76,7 @@ def write(total: Tracefile, report: Report, out: Path, option: str) -> None:
 
 
 def read_tracefile(path: Path) -> Tracefile:
-    """What a tracefile holds, nothing if there is none yet. Raises BadInput."""
+    """The content of a tracefile; empty if the file does not exist. Raises BadInput."""
     if not path.exists():
         return {}
     return decode(read_input(path).decode("utf-8-sig", "surrogateescape"), str(path))

@@ -1,9 +1,9 @@
 """`mirotwin fw run`: an image on a board, or on the bare processor with nothing but its serial port and pins connected.
 
-With --terminal the keyboard and the screen are a terminal on that port. This is one of the few places that know the
-wall clock. The machine does not: the same keys at the same machine cycles give the same bits. The terminal has its old
-settings back however the run ends: Ctrl-], the program's end, an exception, or a signal, which `shell.program` turns
-into an exception.
+With --terminal the keyboard and the screen are a terminal on that port. This module is one of the few that use the wall
+clock. The machine does not: the same keys at the same machine cycles give the same bits. The terminal's settings are
+restored however the run ends: Ctrl-], the program's end, an exception, or a signal, which `shell.program` turns into an
+exception.
 """
 
 from __future__ import annotations
@@ -70,7 +70,7 @@ def limit_tick(options: BareOptions) -> int:
 
 
 def run_world(world: World, options: BareOptions) -> None:
-    """Runs to its end or to the limit."""
+    """Runs to the end of the world or to the limit."""
     end_tick, cpu = limit_tick(options), board_of(world).cpu
     with ProgressBar("running", options.max_cycles) as bar:
         while not world.finished and world.tick < end_tick:
@@ -100,7 +100,7 @@ def run_terminal(world: World, options: BareOptions) -> None:
 
 
 def _keys(keyboard: int, due_s: float) -> bytes | None:
-    """What was typed until `due_s`, which is waited for; None when the terminal has gone."""
+    """Waits until `due_s`; returns the typed keys, or None if the terminal has gone."""
     keys = b""
     while True:
         remaining_s = due_s - time.monotonic()
@@ -119,7 +119,7 @@ def _keys(keyboard: int, due_s: float) -> bytes | None:
 
 @contextmanager
 def _raw(keyboard: int) -> Iterator[None]:
-    """Every key is handed on as it is, also Ctrl-C, and none is echoed."""
+    """Puts the keyboard into raw mode: every key, also Ctrl-C, is passed on, and none is echoed."""
     import termios
     import tty
 
@@ -164,15 +164,14 @@ class FwRunOptions(Options, frozen=True, kw_only=True):
 
 @command_of(FwRunOptions)
 def run(options: FwRunOptions) -> int:
-    """Runs IMAGE.ihx on a bare AT89C52, or on a board (--board); what it sends goes to stdout as it is.
+    """Runs IMAGE.ihx on a bare AT89C52, or on a board (--board); its output goes to stdout unchanged.
 
     MORE.ihx are loaded beside it: a program and the monitor that starts it.
 
-    Exit codes: 0 --until was reached (or, without it, the firmware ended), 1 the firmware ended before it,
-    3 firmware fault, 42 --max-cycles was reached. Ctrl-C (130) leaves on stdout what was sent until then, and
-    writes no dump.
+    Exit codes: 0 --until was reached (or, without it, the firmware ended), 1 the firmware ended before it, 3 firmware
+    fault, 42 --max-cycles was reached. Ctrl-C (130): the output so far is on stdout, and no dump is written.
 
-    A program with prompts is driven by pairs of --stdin-when and --stdin, in order:
+    To answer prompts, give pairs of --stdin-when and --stdin, in order:
 
     \b
     mirotwin fw run monitor.ihx --baud 9600 --stdin space.bin \\

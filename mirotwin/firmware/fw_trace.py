@@ -29,7 +29,7 @@ class TraceOptions(WindowOptions, frozen=True, kw_only=True):
 
 @command_of(TraceOptions)
 def trace(options: TraceOptions) -> int:
-    """Writes what the processor did in SUBJECT: tick, address, symbol, instruction, changed registers and port pins.
+    """Writes each instruction executed in SUBJECT: tick, address, symbol, instruction, changed registers and port pins.
 
     A line stands for one instruction, one call of an interrupt routine, or one stretch of sleep.
     """
@@ -51,7 +51,7 @@ def trace(options: TraceOptions) -> int:
 
 SAVE_SUFFIX = ".gtkw"
 LATE_TICKS = 2 * PWM_PERIOD_TICKS
-"""Encoder edges are known a step of the drive later."""
+"""Encoder edges become known up to one step of the drive late."""
 
 
 class VcdOptions(WindowOptions, frozen=True, kw_only=True):
@@ -62,7 +62,7 @@ class VcdOptions(WindowOptions, frozen=True, kw_only=True):
 
 @command_of(VcdOptions)
 def vcd(options: VcdOptions) -> int:
-    """Writes what happened on the wires in SUBJECT as a VCD file, with a save file for GTKWave beside it.
+    """Writes the levels of the wires in SUBJECT as a VCD file, with a save file for GTKWave beside it.
 
     The wires: RXD and TXD; on the robot, the bus and the pins of both LM629 and the encoders; on a board of parts, all
     nets; interrupt routines in service, sleep, port pins. Every one is a 1-bit wire; the save file puts buses together.

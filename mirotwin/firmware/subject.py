@@ -1,4 +1,4 @@
-"""SUBJECT, what the `mirotwin fw` commands look into: an image, a board, a scenario, a recording or a stream file."""
+"""SUBJECT of the `mirotwin fw` commands: an image, a board, a scenario, a recording or a stream file."""
 
 from __future__ import annotations
 
@@ -52,7 +52,7 @@ IMAGE_SUFFIXES = (".ihx", ".hex", ".ihex")
 
 
 class SubjectOptions(Options, frozen=True, kw_only=True):
-    """SUBJECT, and what the command line says about its run."""
+    """SUBJECT and the options of its run."""
 
     subject: Annotated[str, Argument("SUBJECT", NAME)]
     seed: Annotated[int | None, SEED.saying("Scenario, board: master seed of all noise. Default 0.")] = None
@@ -76,7 +76,7 @@ class SubjectOptions(Options, frozen=True, kw_only=True):
 
     @property
     def files(self) -> tuple[str | None, ...]:
-        """What is read, and so must not be written."""
+        """The input files, which must not be written."""
         return (self.subject, self.firmware, *self.bare.files)
 
 
@@ -87,7 +87,7 @@ class WindowOptions(SubjectOptions, frozen=True, kw_only=True):
     to_time: Annotated[Time | None, TO.saying("End there. Default: the end of the run.")] = None
 
     def ticks(self, crystal_hz: int) -> tuple[int, int | None]:
-        """Where the window begins and ends; None: with the run. Raises BadInput for an empty one."""
+        """First and last tick of the window; None: the end of the run. Raises BadInput for an empty window."""
         return window(self.from_time, self.to_time, crystal_hz)
 
 
@@ -134,10 +134,10 @@ def open_run(options: SubjectOptions) -> InspectedRun:
 def look(
     run: InspectedRun, options: WindowOptions, *watchers: Watcher, early_ticks: int = 0, late_ticks: int = 0
 ) -> int:
-    """Runs it under the eyes of `watchers` and says how it ended; returns the exit code.
+    """Runs with `watchers` and reports how the run ended; returns the exit code.
 
-    They look on from `early_ticks` before the window to `late_ticks` behind it, as far as the run goes.
-    Raises BadInput when the run was over before there was anything to look at.
+    They watch from `early_ticks` before the window to `late_ticks` behind it, or to the end of the run. Raises BadInput
+    if the run ends before the window.
     """
     from_tick, to_tick = options.ticks(run.tick_hz)
     first_tick = max(0, from_tick - early_ticks)
@@ -207,7 +207,7 @@ def _robot_run(options: SubjectOptions) -> InspectedRun:
 
 
 def _by_steps(spec: RunSpec, text: AnyText) -> RunSpec:
-    """The run of a scenario with steps, as what they sent and did. Raises BadInput."""
+    """The run of a scenario with steps, as a script of everything that the steps sent and did. Raises BadInput."""
     from mirotwin.verify.steps.reading import steps_in  # `fw run` starts without
 
     with ProgressBar("doing its steps", spec.scenario.end_tick) as bar:

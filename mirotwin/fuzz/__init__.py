@@ -1,5 +1,5 @@
-"""Fuzzing firmware: inputs that make it do what it must not, guided by what it executes.
+"""Fuzzes firmware: searches for inputs that make it fail, guided by its coverage.
 
-What belongs here: targets, engines, what is made of a crash. What does not: the compiled machine that runs an input
-(`miro_robot.harness`), and the checks that have the last word (`mirotwin.verify.checks`).
+This package contains targets, engines and the triage of crashes. It does not contain the compiled machine that runs an
+input (`miro_robot.harness`), nor the checks that confirm a failure (`mirotwin.verify.checks`).
 """

@@ -1,7 +1,7 @@
-"""A target that is any 8051 firmware with a serial port, on a processor with 64 KB of RAM, or on a board with parts.
+"""A target for any 8051 firmware with a serial port, on a processor with 64 KB of RAM, or on a board with parts.
 
-Where the firmware sleeps when it has nothing to do, a run ends when it sleeps and has sent all it had; where it polls
-for ever, 10 ms (at 24 MHz) after the last character, unless a time is given.
+For firmware that sleeps when idle, a run ends when it sleeps and has sent everything. For firmware that polls for ever,
+a run ends 10 ms (at 24 MHz) after the last character, unless another time is given.
 """
 
 from __future__ import annotations
@@ -47,20 +47,19 @@ MOST_OF_A_BODY = 32
 MOST_PUT_SEEDS = 64
 WAIT = bytes([SILENCE, 19])
 _BITS = (b"\0\0", b"\x01\0", b"\xff\x7f", b"\xfe\xff", b"\xff\xff")
-"""Of a put in a seed: the ends and the middle of a number, and four words."""
+"""Values of a put in a seed: ends and middle of a number, and four words."""
 UNHEARD_BAUD = 9600
-"""Of characters to firmware that does not listen: what parts say is all that it goes by."""
+"""Baud rate of characters sent to firmware whose receiver is off: such firmware reacts to parts only."""
 _SEEN = ("received", "transmitted")
 _BY_TICK = itemgetter(0)
 
 
 class BoardTarget(Target):
-    """`image` on a processor alone, up and in silence. `scenario`: the board on its wire.
-
-    `protocol` makes frames of bodies; without it they are sent as they are. `checks` judge each run, `baud` 0 takes the
-    rate of the receiver, `after_ticks` is how long a run goes on after its last character. `run(data)` returns 0 or
-    what `failure` is: a fault, no sleep, what a check says. `machine`: a board with parts, which is up, in the place of
-    the bare processor. Raises BadInput where the firmware does not come up.
+    """`image` on a bare processor, started and idle. `scenario`: the board on its wire. `protocol` makes frames of
+    bodies; without it bodies are sent unchanged. `checks` judge each run; `baud` 0: the rate of the receiver;
+    `after_ticks`: length of a run after its last character. `run(data)` returns 0 or the code of `failure`: a fault, no
+    sleep, or a failed check. `machine`: a started board with parts, instead of the bare processor. Raises BadInput if
+    the firmware does not start.
     """
 
     def __init__(
@@ -158,7 +157,7 @@ class BoardTarget(Target):
         return Failure(check.name, 0, 0, self.end_tick(), "", raised(error), alone_hz=hertz)
 
     def _feed(self, monitor: Any) -> None:
-        """Tells a monitor what the serial port took and gave in the last run, and when RST went up and down."""
+        """Passes the characters received and sent in the last run, and the edges of RST, to a monitor."""
         bus = self.bus
         happened: list[tuple[int, Event | None]] = [
             (tick - before, None) for tick in bus.resets for before in (RESET_TICKS, 0)
@@ -183,7 +182,10 @@ class BoardTarget(Target):
                 monitor.event(caused)
 
     def _awake(self) -> int:
-        """Firmware that waits for its transmitter is awake, and no worse for it: as long as it sends, it may go on."""
+        """Checks that the firmware sleeps again; while it is still sending it may continue.
+
+        Returns a failure code or 0.
+        """
         cpu, bus = self.cpu, self.bus
         end = 12 * cpu.cycles + LONGEST_ANSWER_TICKS
         sent = -1
@@ -228,7 +230,7 @@ class BoardTarget(Target):
         return f"{described(item)}  # {'; '.join(parts)}"
 
     def seeds(self) -> list[bytes]:
-        """Inputs to begin with: the protocol's samples, one by one and all together."""
+        """First inputs of a campaign: the protocol's samples, one by one and all together."""
         protocol = self.protocol
         samples: tuple[bytes, ...] = (b"\0", b"A", bytes(range(8)))
         if protocol is not None:
@@ -245,7 +247,10 @@ class BoardTarget(Target):
         return list(dict.fromkeys([*each, b"".join(each), *played, *own]))
 
     def inputs_of(self, happened: Iterable[ScriptItem]) -> list[bytes]:
-        """One input; of a class other than a session it has the characters alone. Of a frame it has what it carries."""
+        """At most one input. Only a session keeps pauses, resets and puts.
+
+        A frame is kept as its payload, unless inputs are bytes.
+        """
         items = [item for item in happened if not isinstance(item, Transmission) or item.direction == DOWN]
         texts = [item.data for item in items if isinstance(item, Transmission)]
         if self.input != "session":
@@ -270,7 +275,7 @@ class BoardTarget(Target):
         return [bytes(data)] if data else []
 
     def _operations(self, characters: bytes) -> bytes:
-        """The frames in these characters as what they carry, and all else as characters, which only a session has."""
+        """The frames in these characters as their payloads; the other characters are kept in a session only."""
         protocol = self.protocol
         frames = (
             [] if protocol is None else called(protocol.decode, lambda: list(protocol.decode(characters)))

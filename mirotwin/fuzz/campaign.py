@@ -1,11 +1,10 @@
-"""A campaign: what is done with what an engine finds, until the time is over.
-
-This is one of the few places that know the wall clock.
+"""A campaign: collects, judges and triages an engine's inputs until the time is over. This module is one of the few
+that use the wall clock.
 
     engine ──crashes──► triage: minimised, grouped, confirmed
        └────queue────► coverage, --covering, checks in Python (a share of the time, the rest waits)
 
-The engine works in processes of its own, so it goes on while one of its inputs is looked at.
+The engine runs in its own processes and continues while an input is examined here.
 """
 
 from __future__ import annotations
@@ -27,26 +26,24 @@ from mirotwin.shell.verdicts import Verdict
 LOOK_S = 0.2
 """Wall time between two looks at the engine."""
 SLICE_S = 0.5
-"""How long inputs of the queue are looked at in one go."""
+"""Longest time in which queue inputs are examined without a break, in seconds."""
 LOOKED = 8
 """Inputs of the queue that are looked at between two crashes, which take longer."""
 AFTER_S = 20.0
-"""How long inputs are still looked at once the time is over."""
+"""Longest time in which inputs are still examined after the end of the campaign, in seconds."""
 
 
 class Covering(msgspec.Struct, frozen=True):
-    """A function that is to be reached, and where it begins."""
+    """A function that an input should reach, and its address."""
 
     name: str
     address: int
 
 
 class Campaign:
-    """One campaign. `expected`: checks in Python that look at each input of the queue; `tell` gets each crash at once.
-
-    `inputs`: those of the queue that were looked at; `judged`: those that the checks have looked at; `verdicts`: what
-    each of these came to; `reached_by`: the stream that reached what was to be reached. `until_crash`: the first crash
-    that is confirmed ends it. `show` is called now and then.
+    """One campaign. `expected`: Python checks run on each input of the queue; `tell` gets each crash at once. `inputs`:
+    examined inputs of the queue; `judged`: inputs judged by the checks, with their `verdicts`; `reached_by`: the stream
+    that reached the wanted function. `until_crash`: end at the first confirmed crash. `show` is called regularly.
     """
 
     def __init__(
@@ -92,7 +89,7 @@ class Campaign:
     # ---- the loop ------------------------------------------------------------------------------------------
 
     def run(self, time_s: float) -> None:
-        """Until the time is over or it has what it was to find. The engine is stopped however it ends."""
+        """Runs until the time is over or the wanted result is found. The engine is stopped in any case."""
         self._began_s = time.monotonic()
         try:
             self.engine.start()
@@ -108,13 +105,13 @@ class Campaign:
         self._collect()
 
     def finish(self, limit_s: float) -> int:
-        """Looks at what is left, so long at most; returns how many inputs were left out."""
+        """Examines the remaining inputs for at most `limit_s` seconds; returns the number of inputs left out."""
         self._work(time.monotonic() + limit_s, at_ease=True)
         return len(self._crashes) + len(self._queue) + len(self._to_judge)
 
     @property
     def crashed(self) -> bool:
-        """True if it has the crash that ends it."""
+        """True if a crash was found that ends the campaign."""
         return self.until_crash and bool(self.triage.confirmed)
 
     @property
@@ -127,7 +124,7 @@ class Campaign:
         return (self._stopped_s or time.monotonic()) - self._began_s
 
     def progress(self) -> EngineProgress:
-        """How far the engine is; of one that has ended with an error, how far it was at the last look."""
+        """The engine's progress; the last known one if the engine ended with an error."""
         with suppress(BadInput):
             self._progress = self.engine.progress()
         return self._progress
@@ -180,7 +177,7 @@ class Campaign:
             self.tell(crash)
 
     def _look(self, data: bytes) -> None:
-        """An input that found something new: what it executes."""
+        """Examines an input with new coverage: records what it executes."""
         self.inputs += 1
         self.triage.folder.write("corpus", f"input-{self.inputs:05d}", data)
         counts = self.triage.reached.run(data)

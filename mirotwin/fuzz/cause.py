@@ -1,12 +1,13 @@
-"""Where a run that ended in a fault went wrong: the instruction behind the fault, which tells crashes apart.
+"""Finds the cause of a fault: the instruction that went wrong first, by which crashes are distinguished.
 
-One overflow overwrites return addresses with what the input holds, so the same mistake ends in faults all over the
-image. What they have in common is the instruction that wrote over the stack:
+One overflow overwrites return addresses with input bytes, so the same mistake ends in faults all over the image. They
+share the instruction that overwrote the stack:
 
     store ──overwrites──► return address ──RET──► anywhere ──► the fault
       └ the cause          └ else the RET, where nobody saw the store
 
-Looked for step by step, some hundred times slower than a run: only for inputs that fail.
+The search runs instruction by instruction, some hundred times slower than a normal run, so it is used for failing
+inputs only.
 """
 
 from __future__ import annotations
@@ -24,7 +25,7 @@ _RET = 0x22
 
 
 class Cause(msgspec.Struct, frozen=True):
-    """The instruction at `pc` did what `what` says; "" for the fault itself."""
+    """The instruction at `pc` and its mistake `what`; "" for the fault itself."""
 
     pc: int
     what: str = ""
@@ -44,7 +45,7 @@ class CauseWatcher(Watcher):
         self.begin(cpu)
 
     def begin(self, cpu: Cpu) -> None:
-        """The run begins where `cpu` is now."""
+        """Starts the search at the present state of `cpu`."""
         self.cause = None
         frames = [frame for frame in self._unwinder.frames(cpu) if frame.known and frame.entry]
         self._frames = [(frame.base, _word(cpu, frame.base)) for frame in reversed(frames)]
@@ -71,7 +72,7 @@ class CauseWatcher(Watcher):
         self._frames.append((cpu.sp, back))
 
     def _came_from_no_call(self, cpu: Cpu) -> bool:
-        """True if a return went to what no way through the code leads to."""
+        """True if a return jumped to an address that no call pushed."""
         return cpu.pc not in self._unwinder.heights and self._unwinder.call_before(cpu.pc) < 0
 
 

@@ -1,8 +1,6 @@
-"""A folder of inputs that a user gives: recordings, stream files, captures, and inputs of earlier campaigns.
-
-Files are taken from the folder itself and, where it is one that a campaign or afl-fuzz left, from the folders of its
-queues. Hidden files are not looked at. Files of other kinds are passed over and named in one line; a folder in which
-nothing is an input is refused.
+"""Reads a user's folder of inputs: recordings, stream files, captures, and inputs of earlier campaigns. In a folder
+that a campaign or afl-fuzz wrote, the queue folders are read, too. Hidden files are ignored. Files of other kinds are
+skipped and named in one line; a folder without any input is refused.
 """
 
 from __future__ import annotations
@@ -30,14 +28,14 @@ FOREIGN = (
 )  # fmt: skip
 """Suffixes of files that are no inputs, whatever bytes they hold."""
 TIMED = ("pcapng", "pcap", "recording", "stream")
-"""Forms that are taken for what was sent; other text may as well be an input."""
+"""Formats that are read as transmissions; other text could also be a raw input."""
 _NAMED = 3
 MOST = 2000
 """Inputs that are taken from a folder."""
 
 
 Convert = Callable[[Iterable[ScriptItem]], list[bytes]]
-"""Makes inputs of what was sent and done."""
+"""Converts transmissions and actions to inputs."""
 
 
 def read_corpus(folder: Path, convert: Convert) -> tuple[list[bytes], list[str]]:

@@ -1,6 +1,6 @@
 """What input generators have in common. Each runs in processes with a target each, which hand inputs over as files.
 
-Nothing here imports a hot module: a process that has a target chooses its engine by the specification first.
+This module imports no hot module: a process with a target first chooses its engine by the specification.
 """
 
 from __future__ import annotations
@@ -20,7 +20,7 @@ if TYPE_CHECKING:
     from mirotwin.fuzz.target import Target
 
 PATIENCE_S = 10.0
-"""Time for a job to write its last files once it is ordered to end."""
+"""Time for a job to write its last files after it is ordered to end, in seconds."""
 LOG_BYTES = 1 << 20
 """A log is emptied when it is longer: afl-fuzz writes a line for each input that it takes up."""
 LONGEST_BYTES = 1024
@@ -29,11 +29,10 @@ _COUNT = struct.Struct("<Q")
 
 
 class EngineInput(msgspec.Struct, frozen=True):
-    """What an engine begins with. `target`: the JSON of a `TargetSpec`. `seeds`: a folder of inputs.
-
-    `out`: the folder of the campaign, made if it is not there. `dictionary`: a file of words for AFL++. `jobs`: so many
-    processes, each with a target of its own. `seed`: of the random numbers; the system's where none is given.
-    `lengths`: the shortest and the longest input in bytes that AFL++ makes.
+    """Parameters of an engine. `target`: the JSON of a `TargetSpec`. `seeds`: a folder of inputs. `out`: the campaign's
+    folder, created if missing. `dictionary`: a file of words for AFL++. `jobs`: number of processes, each with its own
+    target. `seed`: of the random numbers; None: from the system. `lengths`: shortest and longest input made by AFL++,
+    in bytes.
     """
 
     target: str
@@ -49,7 +48,7 @@ NOTHING = EngineInput("", Path(), Path(), jobs=0)
 
 
 class EngineProgress(msgspec.Struct, frozen=True):
-    """A campaign so far; `edges` is None as long as nothing is known."""
+    """A campaign's progress; `edges` is None until it is known."""
 
     executions: int = 0
     edges: int | None = None
@@ -124,10 +123,9 @@ _CLASSES = bytes(_class_of(count) for count in range(256))
 
 
 class Job:
-    """A process of an engine, which runs at once and gets no Ctrl-C of a terminal.
-
-    In `out`, beside the folder of its name with `queue` and `crashes`: its output as NAME.log, how many inputs its
-    target has run as NAME.counts, and what that complained of as NAME.target.
+    """A process of an engine. It starts at once and gets no Ctrl-C of a terminal. It writes into `out`: the folder NAME
+    with `queue` and `crashes`, its output NAME.log, the number of inputs run NAME.counts, and the target's error
+    messages NAME.target.
     """
 
     def __init__(
@@ -161,7 +159,7 @@ class Job:
         return self.process.poll() is None
 
     def wait(self) -> None:
-        """Waits until it has ended; one that does not end is killed, and its target with it."""
+        """Waits until the process has ended; kills it and its target after `PATIENCE_S`."""
         try:
             self.process.wait(PATIENCE_S)
         except subprocess.TimeoutExpired:
@@ -170,10 +168,9 @@ class Job:
 
 
 class Engine:
-    """One campaign of an engine, which gives paths of files that hold an input each.
-
-    This one makes up no inputs: there is none to begin with. The others derive from it, and start the jobs of `given`.
-    `watch`: a target by which the edges of their inputs are counted.
+    """One campaign of an engine, which yields paths of input files. This base class generates no inputs; it is used if
+    no seed is usable. Derived classes start the jobs of `given`. `watch`: a target that counts the edges of their
+    inputs.
     """
 
     def __init__(self, given: EngineInput = NOTHING, watch: Target | None = None) -> None:
@@ -196,7 +193,7 @@ class Engine:
             job.wait()
 
     def progress(self) -> EngineProgress:
-        """How far it is. Raises BadInput for a job that has ended with an error, with its own line."""
+        """The present progress. Raises BadInput, with the job's own error line, if a job ended with an error."""
         self._require_health()
         if self._explorer is None or not self.jobs:
             return EngineProgress()
@@ -221,7 +218,7 @@ class Engine:
         return paths
 
     def _inputs(self, kind: str) -> list[Path]:
-        """All that its jobs have left in `queue` or `crashes`, without those that one took over from another."""
+        """All files that its jobs left in `queue` or `crashes`, without files imported from another job."""
         taken = {f"sync:{job.name}" for job in self.jobs}
         left = [path for job in self.jobs for path in sorted((job.folder / kind).glob("id:*"))]
         return [path for path in left if taken.isdisjoint(path.name.split(","))]
@@ -234,7 +231,7 @@ class Engine:
                 os.truncate(job.log, 0)
 
     def _interrupt(self, job: Job) -> None:
-        """Tells a job to end."""
+        """Orders a job to end."""
         job.process.kill()
 
     def _why_ended(self, job: Job) -> BadInput:

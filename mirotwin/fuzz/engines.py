@@ -19,7 +19,7 @@ if TYPE_CHECKING:
     from mirotwin.fuzz.target import Target
 
 _TOKENS, _TOKEN = 32, 64
-"""How many inputs are words of a foreign format, and how much of them."""
+"""Largest number of inputs used as words of a foreign format, and largest length of such a word in bytes."""
 
 
 def engine_for(

@@ -1,16 +1,16 @@
-"""The folder of a campaign: what stands where.
+"""The folder of a campaign, by files:
 
 OUT/
   crashes/NAME.stream      a case: `mirotwin replay` gives the verdict again
   crashes/NAME.input       the minimised input, for --corpus
   crashes/NAME.txt         the same as readable lines
-  crashes/NAME.info        what it executed, as an lcov tracefile
-  unconfirmed/NAME.*       what a world did not find wrong: the same files, and a stream that nothing is expected of
+  crashes/NAME.info        its coverage, as an lcov tracefile
+  unconfirmed/NAME.*       failures that a world did not confirm: the same files, and a stream without a check
   covering/SYMBOL.*        the input that reached a function (--covering)
   corpus/                  inputs that found something new
-  seeds/, dictionary       what it began with
+  seeds/, dictionary       the start of the campaign
   engine/                  the engine's own
-  coverage.info            what all inputs executed
+  coverage.info            coverage of all inputs
   summary.json
 """
 
@@ -42,10 +42,9 @@ OPTION = "--out"
 
 
 class CampaignFolder:
-    """`path` as the folder of a campaign, which has it for itself while it writes there (`filled`).
-
-    Raises OutputError for one that another process writes to, and for one that holds something, unless `force`: then
-    what an earlier campaign left is taken away, and a folder that holds anything else is refused all the same.
+    """The folder `path` of a campaign, locked while it is written (`filled`). Raises OutputError if another process
+    writes to it, or if it is not empty. With `force` the files of an earlier campaign are removed; a folder with any
+    other file is still refused.
     """
 
     def __init__(self, path: Path, force: bool = False) -> None:
@@ -58,7 +57,7 @@ class CampaignFolder:
         self._replaceable()
 
     def _replaceable(self) -> list[str]:
-        """Names of what an earlier campaign left. Raises OutputError where that must stay."""
+        """Names of the files that an earlier campaign left. Raises OutputError if they must stay."""
         present = entries(self.path, OPTION)
         others = [name for name in present if name not in (*FOLDERS, *FILES)]
         if present and not self._force:
@@ -70,7 +69,7 @@ class CampaignFolder:
         return present
 
     def _empty(self) -> None:
-        """Takes away what an earlier campaign left."""
+        """Removes the files of an earlier campaign."""
         for name in self._replaceable():  # again: another campaign may have filled it since
             if (self.path / name).is_dir() and not (self.path / name).is_symlink():
                 shutil.rmtree(self.path / name)
@@ -78,7 +77,7 @@ class CampaignFolder:
                 (self.path / name).unlink()
 
     def folder(self, name: str) -> Path:
-        """One of its folders, which is made."""
+        """Creates and returns one of its subfolders."""
         assert name in FOLDERS
         path = self.path / name
         path.mkdir(parents=True, exist_ok=True)
@@ -124,7 +123,7 @@ class CampaignFolder:
 
 
 def unused(path: Path) -> Path:
-    """`path`, or the first of `path-2`, `path-3`, .. with nothing in it: what an earlier campaign found is not lost."""
+    """`path`, or the first empty one of `path-2`, `path-3`, .., so that no earlier result is lost."""
     number, free = 1, path
     while free.is_dir() and any(free.iterdir()):
         number += 1

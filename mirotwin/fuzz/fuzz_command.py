@@ -1,6 +1,5 @@
-"""`mirotwin fuzz`: inputs that make firmware fail, found by an engine that is guided by what the firmware executes.
-
-This is one of the few places that know the wall clock.
+"""`mirotwin fuzz`: searches for inputs that make firmware fail, with a coverage-guided engine. This module is one of
+the few that use the wall clock.
 """
 
 from __future__ import annotations
@@ -78,7 +77,7 @@ if TYPE_CHECKING:
 
 LONGEST_S = 1e7
 BOARD_S = 60
-"""A board alone is the scenario of so many seconds."""
+"""Duration of the scenario of a board that is given without a scenario, in seconds."""
 _NINE_BITS = 0x80  # of SCON: SM0
 BARE = "Any 8051 firmware with a serial port"
 BOARD = "A board with parts"
@@ -214,27 +213,26 @@ class FuzzOptions(Options, frozen=True, kw_only=True):
 LINE_S = 10.0
 """Wall time between two plain lines, where stderr is no terminal."""
 INTERRUPTED_S = 5.0
-"""How long inputs are still looked at after a Ctrl-C."""
+"""Longest time in which inputs are still examined after a Ctrl-C, in seconds."""
 
 
 @command_of(FuzzOptions)
 def fuzz(options: FuzzOptions) -> int:
-    """Looks for inputs that make IMAGE.ihx (default: the robot's own firmware) fail, on the robot's board.
+    """Searches for inputs that make IMAGE.ihx (default: the robot's own firmware) fail, on the robot's board.
 
-    Each input is played from the moment at which the firmware is up. Faults and the promises of the protocol are judged
-    in each; what fails is made small, played again in a World, and left in --out as crashes/NAME.stream, a case for
-    `mirotwin replay`. Afterwards it says which functions and lines no input has reached.
+    Each input starts when the firmware has booted. Firmware faults and the rules of the protocol are checked in each. A
+    failing input is minimised, repeated in a World, and written to --out as crashes/NAME.stream, a case for `mirotwin
+    replay`. At the end the functions and lines that no input reached are listed.
 
-    With --bare it is any 8051 firmware with a serial port, on a processor to which nothing of the robot is connected.
+    With --bare IMAGE.ihx is any 8051 firmware with a serial port, on a processor without the robot's hardware.
 
     BOARD is a NAME.board.toml, with --firmware, or the scenario of a board. Inputs are characters, values of its parts
-    and levels on pins that nothing drives. They begin after the waits with which the scenario's steps begin; without
-    steps, once the firmware sleeps, or its receiver is on and no branch was new for 300 ms; or after --boot-ms. The
-    scenario's [expect] judges each input.
+    and levels on pins that nothing drives. Inputs start after the first waits of the scenario's steps. Without steps
+    they start when the firmware sleeps, or when its receiver is on and no new branch was executed for 300 ms; or after
+    --boot-ms. The scenario's [expect] judges each input.
 
-    Ctrl-C ends a campaign early, with all that was found.
-
-    Exit code 1: something was found and confirmed, or --covering was not reached.
+    Ctrl-C ends a campaign early and keeps its results. Exit code 1: a failure was found and confirmed, or --covering
+    was not reached.
     """
     if options.image is not None and options.image.endswith(".toml"):
         return _fuzz_board(options)
@@ -303,7 +301,7 @@ def _fuzz_board(options: FuzzOptions) -> int:
 
 
 def _common(options: FuzzOptions, hertz: int) -> TargetSpec:
-    """What is the same of all boards."""
+    """The fields of the target specification that all boards share."""
     return TargetSpec(
         input=options.kind,
         protocol=options.protocol or "",
@@ -355,7 +353,9 @@ def _campaign(
 
 
 def _engine(spec: TargetSpec, passing: list[bytes], folder: CampaignFolder, options: FuzzOptions) -> Engine:
-    """One that goes on from the inputs that pass; one that makes up none where there are none."""
+    """An engine that starts with the passing inputs; the base `Engine`, which generates none, if there are no such
+    inputs.
+    """
     if not passing:
         complain("every input fails or executes no branch: there is nothing to go on from")
         return Engine()
@@ -367,7 +367,7 @@ def _engine(spec: TargetSpec, passing: list[bytes], folder: CampaignFolder, opti
 
 
 def _sorted_out(target: Target, inputs: Iterable[bytes]) -> tuple[list[bytes], list[bytes], list[bytes]]:
-    """Sorts inputs into those that fail, those that an engine can begin with, and those that execute no branch."""
+    """Sorts inputs into failing ones, ones that an engine can start with, and ones that execute no branch."""
     failing: list[bytes] = []
     passing: list[bytes] = []
     silent: list[bytes] = []
@@ -379,7 +379,7 @@ def _sorted_out(target: Target, inputs: Iterable[bytes]) -> tuple[list[bytes], l
 
 
 def _run(campaign: Campaign, time_s: float, options: FuzzOptions) -> int:
-    """The campaign to its end, whatever ends it; the exit code."""
+    """Runs the campaign to its end, also after an interruption; returns the exit code."""
     stopped: BaseException | None = None
     left, quiet = 0, options.quiet
     with FuzzProgress(campaign.triage.target.image.path.name, time_s, quiet) as progress:
@@ -409,7 +409,7 @@ def _run(campaign: Campaign, time_s: float, options: FuzzOptions) -> int:
 
 
 def _report(results: CampaignResults, options: FuzzOptions) -> int:
-    """Shows what a campaign came to, then writes its files; the exit code."""
+    """Shows a campaign's results, then writes its files; returns the exit code."""
     quiet = options.quiet or options.as_json
     if not quiet:
         for part in results.overview():
@@ -490,7 +490,7 @@ def _expected(options: FuzzOptions) -> dict[str, Any]:
 
 
 def _covering(symbol: str | None, image: Image) -> Covering | None:
-    """Where the function begins. Raises BadInput for one that is not there."""
+    """The function and its address. Raises BadInput for an unknown function."""
     if symbol is None:
         return None
     return Covering(symbol, address_of(symbol, image, str(image.path), f"--covering {symbol}"))

@@ -1,7 +1,5 @@
-"""Hypothesis strategies of fuzz inputs: whole operations, so that every byte drawn stands where it means something.
-
-Each draw costs Hypothesis some 20 us, as much as a short run of the target: what need not be drawn apart is
-one draw.
+"""Hypothesis strategies for fuzz inputs. They draw whole operations, so every drawn byte has a meaning. Each draw costs
+Hypothesis some 20 us, as much as a short run of the target, so values are combined into one draw where possible.
 """
 
 from __future__ import annotations
@@ -36,8 +34,8 @@ def inputs(
 ) -> Bytes:
     """Inputs of that kind ("bytes", "frames", "session") for robot `slot` of `robots`.
 
-    `foreign`: frames are of somebody else's wire format: a count and so many bytes. `seeds`: half of the inputs begin
-    with one of them. `puts`: a session may put values of parts and levels on pins.
+    `foreign`: frames have a wire format unknown here: a count byte and that many bytes. `seeds`: half of the inputs
+    begin with one of them. `puts`: a session may put values of parts and levels on pins.
     """
     if kind == "session" and puts:
         put, pin = (st.binary(min_size=3, max_size=3).map(code.__add__) for code in (PUT, PIN))
@@ -54,7 +52,7 @@ def _session(robots: int, slot: int, foreign: bool) -> Bytes:
 
 
 def _session_operations(robots: int, slot: int, foreign: bool) -> Bytes:
-    """One strategy an operation, some more than one."""
+    """A strategy for each operation; frequent operations have several."""
     form = downlink(robots)
     places = st.integers(0, 256 * form.wire_size - 1).map(lambda both: bytes([both >> 8, both & 0xFF]))
     place = st.sampled_from(_BYTES[: form.wire_size])
@@ -133,5 +131,5 @@ def _exactly(size: int) -> Bytes:
 
 
 def _counted() -> Bytes:
-    """A count and so many bytes."""
+    """A count byte and that many bytes."""
     return st.binary(min_size=1, max_size=32).map(lambda some: bytes([len(some) - 1]) + some)

@@ -1,13 +1,13 @@
-"""The engine where AFL++ is missing: processes that draw inputs with Hypothesis, each for a target of its own.
+"""The engine used without AFL++: processes that draw inputs with Hypothesis, each for its own target.
 
 HypothesisRun ── starts ──► python -m mirotwin.fuzz.hypothesis_process SPECIFICATION SEEDS JOB SEED
                                │ JOB/queue/id:..     inputs that executed something new
                                │ JOB/crashes/id:..   inputs with a failure
      reads ◄───────────────────┘ JOB.counts          how many inputs it has run
 
-Hypothesis draws inputs and climbs towards those that execute many edges (`hypothesis.target`); there is no other
-evolution. It remembers all that it has drawn, so it works in rounds, each with a seed of its own. A crash does not
-end its search; crashes are made smaller elsewhere.
+Hypothesis draws inputs and prefers those that execute many edges (`hypothesis.target`); there is no other evolution. It
+remembers all its draws, so it works in rounds, each with its own seed. A crash does not end its search; crashes are
+minimised elsewhere.
 """
 
 from __future__ import annotations
@@ -61,7 +61,7 @@ class HypothesisRun(Engine):
 def explore(
     explorer: Explorer, spec: TargetSpec, seeds: Sequence[bytes], seed: int, tell: Callable[[], None]
 ) -> None:
-    """Runs the seeds, then what Hypothesis draws, for ever. `tell` is called before each run."""
+    """Runs the seeds, then inputs drawn by Hypothesis, for ever. `tell` is called before each run."""
     from miro_exact.rng import Stream  # a hot module: not before the engine was chosen
 
     def run(data: bytes) -> int:

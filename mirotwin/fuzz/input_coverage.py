@@ -1,7 +1,6 @@
-"""What inputs reach: coverage of a campaign and of single inputs; and where a run that failed went wrong.
-
-The campaign's own target counts edges at full speed. Here is a second one of the same image that counts instructions,
-some fifty times slower, so it sees only inputs that found something new.
+"""Coverage of a campaign and of single inputs, and the causes of failed runs. The campaign's own target counts edges at
+full speed. This module uses a second target of the same image that counts instructions, some fifty times slower; it
+runs only inputs with new edges.
 """
 
 from __future__ import annotations
@@ -19,7 +18,7 @@ from mirotwin.fuzz.target import Target
 
 
 class InputCoverage:
-    """`total`: what ran in all inputs so far and while the firmware started."""
+    """`total`: the coverage of all inputs so far and of the firmware's start."""
 
     def __init__(self, image: Image, make: Callable[[], Target]) -> None:
         self.names = SymbolNames(image)
@@ -41,7 +40,7 @@ class InputCoverage:
         return counts_of(counters)
 
     def cause(self, data: bytes, pc: int) -> Cause:
-        """Where a run that ends in a fault at `pc` went wrong: there, unless something did before."""
+        """The cause of a fault at `pc`: the instruction there, unless an earlier one went wrong."""
         self.target.harness.back()
         self._watch(data, self._causes)
         return self._causes.cause or Cause(pc)
@@ -59,7 +58,7 @@ class InputCoverage:
 
 
 def _watched(make: Callable[[], Target], counters: Counters) -> Target:
-    """A target whose processor is counted from the moment at which it gets its program until it is there."""
+    """A target whose processor is counted from the start of its firmware until it is ready."""
     watched: list[Cpu] = []
 
     def watch(cpu: Cpu) -> None:

@@ -1,12 +1,11 @@
-"""What was sent, written down as inputs that the target reads back as the same, and what a campaign begins with.
+"""Converts transmissions to inputs that a target reads back as the same, and defines a campaign's first inputs. In
+`session` pauses keep their length to within a step, and frames become operations, so that a fuzzer changes their
+content and not their CRC. Characters outside a frame stay characters. Telemetry, robots' answers, switched supplies and
+radios, and bad stop bits of characters outside a frame are left out: a session has no operation for them. `frames`
+contains frames only, `bytes` no pauses.
 
-In `session` pauses keep their length to within a step, and frames become operations, so that a fuzzer changes what they
-say and not their CRC. What is no frame becomes characters. Left out are telemetry, what robots say, switched supplies
-and radios, and bad stop bits of characters outside a frame, for which a session has no operation. `frames` has frames
-alone, `bytes` no pauses.
-
-Eight random bytes alone never get past the synchronisation, so a campaign begins with frames: what a host may say, each
-kind of it once. A seed is short, and they differ in what a robot does with them. Tokens are words for AFL++.
+Eight random bytes alone never get past the synchronisation, so a campaign begins with frames: each kind of frame that a
+host may send, once. A seed is short, and each makes a robot react differently. Tokens are words for AFL++.
 """
 
 from __future__ import annotations
@@ -45,7 +44,7 @@ Frame = tuple[int, bytes]
 
 
 def inputs_of(kind: str, happened: Iterable[ScriptItem], robots: int) -> list[bytes]:
-    """The inputs of that kind that this becomes, at most so many transmissions each, no two the same."""
+    """The distinct inputs of that kind made from `happened`, each with a limited number of transmissions."""
     items = [
         item
         for item in happened
@@ -56,7 +55,7 @@ def inputs_of(kind: str, happened: Iterable[ScriptItem], robots: int) -> list[by
 
 
 def input_of(kind: str, items: Sequence[ScriptItem], robots: int) -> bytes:
-    """One input of that kind; empty where it could hold nothing."""
+    """One input of that kind; empty if that kind cannot express any of the items."""
     if kind == "bytes":
         return b"".join(item.data for item in items if isinstance(item, Transmission))
     data = bytearray()
@@ -164,7 +163,7 @@ def talks(robots: int, slot: int) -> list[list[TimedMessage]]:
 
 
 def sent(talk: Sequence[TimedMessage], robots: int) -> list[Transmission]:
-    """A talk as what goes over the air."""
+    """A talk as transmissions."""
     transmissions: list[Transmission] = []
     end_tick = 0
     for message, silence_ms in talk:
@@ -183,7 +182,7 @@ def seeds(kind: str, robots: int, slot: int) -> list[bytes]:
 
 
 def wire_tokens(robots: int) -> list[bytes]:
-    """For inputs that are characters: what a frame begins with, and one whole frame of each kind."""
+    """Tokens for inputs of characters: the begin of a frame, and one whole frame of each kind."""
     form = downlink(robots)
     still = ((0, 0),) * robots
     messages: list[Message] = [TeamFrame(kind, 1, still) for kind in (FrameType.TEAM, FrameType.TEAM_ASK)]
@@ -194,7 +193,9 @@ def wire_tokens(robots: int) -> list[bytes]:
 
 
 def message_tokens(robots: int) -> list[bytes]:
-    """For inputs whose frames are sealed by the target: heads of service payloads, and limits of numbers."""
+    """Tokens for inputs whose frames are sealed by the target: heads of service payloads, and limit values of
+    numbers.
+    """
     heads = [bytes([slot, op]) for op in Opcode for slot in range(robots)]
     speeds = [limit for field in VELOCITY for limit in (field.low, field.high, field.low - 1)]
     speeds += [VELOCITY_SATURATION, VELOCITY_SATURATION + 1, -VELOCITY_SATURATION, -VELOCITY_SATURATION - 1]

@@ -1,4 +1,4 @@
-"""Who has the last word on an input: it is played once more from power-on, without the machinery that found it.
+"""Confirms a failing input: plays it again from power-on, without the code that found it.
 
 input ──► Target.script ──► a World: ideal radio, carrier on, the robot of the target alone; or a board alone
                                   │ checks: the one that the crash names, and those that are always on
@@ -24,7 +24,7 @@ from mirotwin.runs.run import Run, robot_spec
 from mirotwin.verify.checks.expect import ALWAYS_ON, CHECKS, struct_of
 
 AFTER_TICKS = TICKS_PER_SECOND // 20
-"""How long a world goes on after the input and the crash: an answer may take 30 ms, a frame 10 ms."""
+"""Length of a run after the input and the crash: an answer may take 30 ms, a frame 10 ms."""
 _SETTLED_TICKS = TICKS_PER_SECOND // 100
 SILENCES = ("failsafe_stop_ms", "motors_off_ms")
 
@@ -97,7 +97,7 @@ def oracle_of(target: Target, expected: Expected) -> Oracle:
 
 
 def expected_of(check: str) -> dict[str, Any]:
-    """The check that tells whether a failure of that name is one; the failsafe's with the fast oracle's tolerance."""
+    """The check that confirms a failure of that name; the failsafe's with the fast oracle's tolerance."""
     if check == NEVER_SLEEPS:
         return {"acts_within_ms": True}
     if check in SILENCES:

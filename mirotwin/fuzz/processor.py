@@ -47,13 +47,13 @@ class Processor:
 
     device = board
     script: Sequence[ScriptItem] = ()
-    """What brought it up."""
+    """The script that started it."""
 
     def run(self, tick: int) -> int:
         return self.cpu.run(-(-tick // CYCLE_TICKS))
 
     def start_up(self, crystal_hz: int, boot_ms: int) -> None:
-        """Until the firmware sleeps, or so long. Raises BadInput where it does what it must not."""
+        """Runs until the firmware sleeps, at most `boot_ms`. Raises BadInput for a firmware fault."""
         end = crystal_hz * boot_ms // 12_000
         self.cpu.stop_asleep = 1
         while self.cpu.cycles < end and not self.bus.fault_kind:
@@ -67,7 +67,7 @@ class Processor:
             raise BadInput(self.image.path, "", reason, "mend it, or see `mirotwin fw run`")
 
     def fault(self) -> FirmwareFault | None:
-        """The first one since `RecordingBus.begin`."""
+        """The first firmware fault since `RecordingBus.begin`."""
         bus = self.bus
         if not bus.fault_kind:
             return None
@@ -87,7 +87,7 @@ def powered(image: Image, crystal_hz: int, boot_ms: int) -> Processor:
 
 
 def bit_ticks_of(processor: Processor | WiredMachine, crystal_hz: int, baud: int, boot_ms: int) -> int:
-    """Length of a bit: by `baud`, or as the receiver is set. Raises BadInput where neither says it."""
+    """Length of a bit in ticks, from `baud` or from the receiver's setting. Raises BadInput if neither is known."""
     if baud:
         ticks = (2 * crystal_hz + baud) // (2 * baud)
         if not baud >= 50 or ticks < FASTEST_BIT_TICKS:

@@ -1,4 +1,4 @@
-"""What a campaign comes to: counts, coverage, crashes with the line that repeats each, and the files that hold them."""
+"""The results of a campaign: counts, coverage, crashes with the command that repeats each, and their files."""
 
 from __future__ import annotations
 
@@ -28,7 +28,7 @@ SUMMARY = "summary.json"
 
 
 class CampaignResults:
-    """Of a campaign that is over. `left`: inputs that were not looked at; `complete`: it came to the end of its time.
+    """Results of a finished campaign. `left`: number of inputs not examined; `complete`: it ran for its full time.
 
     `in_files`: the checks of --expect that are in a file, by their name, as FILE.py:CLASS; `plugins`: parts of --part.
     """
@@ -59,7 +59,7 @@ class CampaignResults:
 
     @property
     def _unfinished(self) -> Verdict:
-        """Without what was found."""
+        """The verdict without regard to crashes."""
         missed = self.campaign.covering is not None and self.campaign.reached_by is None
         unjudged = "not judged" in self._open_checks().values()
         return "failed" if missed or unjudged else "passed"
@@ -128,7 +128,10 @@ class CampaignResults:
         return {"firmware": image.path.name, "firmware_sha256": image.sha256}
 
     def _case(self, crash: Crash) -> TestCase:
-        """What is not confirmed in a World does not count. The place is the instruction behind it."""
+        """The test case of a crash. A crash that a World did not confirm does not count.
+
+        The place is the instruction that caused it.
+        """
         replay, at_failure = self._commands(crash)
         facts: dict[str, str | int | float] = {"replay": replay, "debug": at_failure, "reproduce": replay}
         place = None if crash.pc is None else self._places.at(crash.pc)
@@ -164,7 +167,7 @@ class CampaignResults:
             yield f"    {line}"
 
     def _commands(self, crash: Crash) -> tuple[str, str]:
-        """The commands that play its case again, and that stand at it."""
+        """The commands that replay its case and that open the debugger at it."""
         expected = (self.in_files[crash.check],) if crash.check in self.in_files else ()
         stream = self.out / crash.folder / f"{crash.name}.stream"
         image = foreign_path(self.triage.target.image)

@@ -1,6 +1,5 @@
-"""What a process needs to know to make a target: one JSON text, handed from process to process.
-
-Nothing here imports a hot module: the process that reads a specification chooses its engine by it.
+"""The specification of a target: one JSON text, passed from process to process. This module imports no hot module: the
+process that reads a specification chooses its engine by it.
 """
 
 from __future__ import annotations
@@ -23,14 +22,12 @@ class TargetSpec(msgspec.Struct, frozen=True, forbid_unknown_fields=True, omit_d
     """A target, as data.
 
     `board`: "miro" is the robot's, "bare" a CPU with a UART, "wired" one with parts. `image`: path of an Intel HEX
-    file, "" is the robot's own firmware. `input`: how the bytes of an input are read ("bytes", "frames" or "session").
-    `robots` and `slot` are the MIRO's. `protocol`: name of the wire format of frames, "" for the board's own;
-    `expected`: checks as --expect takes them, which judge each execution beside the board's own; `baud`: rate of the
-    CPU's UART, 0 for what its maker takes; `after_ticks`: how long a run goes on after its last character, None for the
-    harness's own. `parameters`: all else that a maker takes;
-    `faults`: the MIRO's hardware breaks, too. `engine`: "compiled" or "python", "" for the one that is
-    installed.
-    `maker`: "module:function" in the place of the board's own maker.
+    file, "" is the robot's own firmware. `input`: interpretation of an input's bytes ("bytes", "frames" or "session").
+    `robots` and `slot` are for the MIRO. `protocol`: name of the wire format of frames, "" for the board's own;
+    `expected`: checks as in --expect, which judge each execution besides the board's own checks; `baud`: rate of the
+    CPU's UART, 0 for the maker's default; `after_ticks`: length of a run after its last character, None for the
+    harness's default. `parameters`: all other parameters of a maker; `faults`: the MIRO's hardware may break. `engine`:
+    "compiled" or "python", "" for the installed one. `maker`: "module:function", replaces the board's own maker.
     """
 
     board: Literal["miro", "bare", "wired"] = "miro"
@@ -48,9 +45,9 @@ class TargetSpec(msgspec.Struct, frozen=True, forbid_unknown_fields=True, omit_d
     maker: str = ""
 
     def text(self) -> str:
-        """JSON of one line, in ASCII: paths come back whole that are not UTF-8, which msgspec does not write.
+        """JSON of one line, in ASCII: paths that are not UTF-8, which msgspec does not write, survive unchanged.
 
-        `@@` never stands in it: afl-fuzz would put the name of a file there.
+        It never contains `@@`, which afl-fuzz would replace by a file name.
         """
         return json.dumps(msgspec.to_builtins(self)).replace("@@", "@\\u0040")
 

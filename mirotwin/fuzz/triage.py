@@ -1,8 +1,9 @@
-"""What becomes of an input that failed: minimised, distinguished from the others, confirmed in a World, left as files.
+"""Triage of failed inputs: each is minimised, distinguished from the others, confirmed in a World, and written as
+files.
 
 Two crashes are the same where check and cause are. The cause of a fault is the instruction that went wrong first
-(`cause.py`). Where no instruction did it (nothing came in time, say) it is what the check says, but for its numbers.
-Inputs of a crash that is known are counted, and only the first few without a fault are looked at at all: an easy
+(`cause.py`). If no instruction caused it (a missing answer, for example), the cause is the check's message without its
+numbers. Further inputs of a known crash are only counted, and only the first few without a fault are examined: an easy
 mistake fails thousands of inputs.
 """
 
@@ -33,7 +34,7 @@ MINIMISE_S = 10.0
 TRIES = 50_000
 TRIES_IN_A_WORLD = 400
 SAME_TRIED = 6
-"""Inputs of one check and PC in a row that are looked at although nothing new comes of them."""
+"""Number of inputs of one check and PC in a row that are examined although they give no new crash."""
 CONFIRMED, UNCONFIRMED = "crashes", "unconfirmed"
 _NUMBER = re.compile(r"0x[0-9a-fA-F]+|[0-9]+(\.[0-9]+)?")
 _DIGITS = 6
@@ -54,10 +55,9 @@ class CrashKey(msgspec.Struct, frozen=True):
 
 
 class Crash(msgspec.Struct, frozen=True, kw_only=True):
-    """A mistake that an input shows. `verdict`: of the World, or of the target where that is not confirmed.
-
-    `pc`: the instruction behind it, which did what `cause` says, in `function`; None: no instruction did it. `folder`:
-    `crashes` or `unconfirmed`. `sizes`: bytes of the input as it was found and as it is left.
+    """A failure with its input. `verdict`: of the World, or of the target if it is not confirmed. `pc`: address of the
+    instruction that caused it, in `function`, with the mistake in `cause`; None: no instruction caused it. `folder`:
+    `crashes` or `unconfirmed`. `sizes`: bytes of the original and of the minimised input.
     """
 
     name: str
@@ -77,7 +77,7 @@ class Crash(msgspec.Struct, frozen=True, kw_only=True):
 
 @dataclass(eq=False)
 class Triage:
-    """All that was found so far. `more`: by name, inputs that came down to the same crash or were not looked at.
+    """All failures so far. `more`: by name, inputs that were minimised to the same crash or not examined.
 
     `unrepeated`: inputs that the engine reported as failed and that do not fail again.
     """
@@ -125,7 +125,7 @@ class Triage:
         return self._take(data, group, TRIES, fails, judged)
 
     def take_judged(self, data: bytes, failure: Failure, expected: Expected) -> Crash | None:
-        """An input in whose World one of the checks in `expected` failed; the crash, if it is a new one."""
+        """Takes an input whose World failed one of the checks in `expected`; returns the crash if it is new."""
 
         def judged(shorter: bytes) -> tuple[Run, str]:
             return self.oracle.judged(shorter, expected), ""
@@ -144,7 +144,9 @@ class Triage:
         fails: Callable[[bytes], bool],
         judged: Callable[[bytes], tuple[Run, str]],
     ) -> Crash | None:
-        """`fails`: whether an input is still of the group; `judged`: the verdict on one, and what the target says."""
+        """`fails(data)`: True if an input still belongs to the group; `judged(data)`: the run and the target's
+        message.
+        """
         if self._in_vain[group] >= SAME_TRIED:
             self._count(self._last[group], group)
             return None
@@ -234,15 +236,14 @@ Question = Callable[[bytes], bool]
 def minimise(
     data: bytes, still: Question, tries: int, time_s: float, tell: Callable[[], None] = lambda: None
 ) -> bytes:
-    """The simplest input found within so many tries and so much wall time for which `still` is true.
-
-    `data` itself, where it is not of that. An input that is shorter is simpler; of two as long as each other, the one
-    with more zeros. `tell` is called before each try, for whoever draws a progress line.
+    """The simplest input for which `still` is true, found within `tries` tries and `time_s` seconds of wall time;
+    `data` itself if `still(data)` is false. A shorter input is simpler; of two equally long ones, the one with more
+    zeros. `tell` is called before each try, for a progress line.
 
     Delta debugging (Zeller, Hildebrandt: Simplifying and isolating failure-inducing input, IEEE TSE 28(2), 2002), in
-    the form that takes away one chunk after the other, from half of the input down to single bytes, then the same with
-    zeros in the place of chunks. The order of tries depends on the input alone; where time is over first, a slower
-    machine keeps a longer input.
+    the variant that removes one chunk after the other, from half of the input down to single bytes, then replaces
+    chunks by zeros in the same way. The order of tries depends on the input only; if the time ends first, a slower
+    machine returns a longer input.
     """
     end_s = time.monotonic() + time_s
 
@@ -263,7 +264,7 @@ def minimise(
 
 
 def _simpler(data: bytes, attempt: Question, instead: Callable[[bytes], bytes]) -> bytes:
-    """Replaces chunks, from the end on, so that what comes after the crash goes first."""
+    """Replaces chunks from the end backwards, so that bytes after the crash are removed first."""
     size = max(1, len(data) // 2)
     while size:
         end = len(data)

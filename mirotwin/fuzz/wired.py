@@ -2,7 +2,7 @@
 
     power-on ──> steps of the scenario, or what `_settled` waits for ──> up: inputs begin ──> characters, puts
 
-What a test may put, of any part, becomes 16 bits (`choice_of`), so that inputs need not know the parts.
+Every value that a test may put is encoded in 16 bits (`choice_of`), so that inputs do not depend on the parts.
 """
 
 from __future__ import annotations
@@ -34,22 +34,23 @@ from mirotwin.shell.firmware_image import is_up
 from mirotwin.verify.steps.keys import Step
 
 BOOT_MS = 20_000
-"""How long firmware may take until it settles."""
+"""Longest time for firmware to settle, in milliseconds."""
 SETTLED_MS = 300
 """The firmware has settled when no branch was new for this time."""
 SLICE_MS = 10
 
 Choice = tuple[str, Callable[[int], PutValue]]
-"""The path of a value, and the function from 16 bits to what is put there."""
+"""The path of a value, and the function from 16 bits to the value to put there."""
 
 
 class WiredMachine:
-    """A board with its firmware up, as `Processor` is for a bare one. `script`: what brought it up. `choices`: what an
-    input may put, the first `values` of them values of parts, then pins. `to_pc`: characters that the board has sent
-    since the last `begin`, with the tick of their stop bit.
+    """A board with booted firmware, the counterpart of `Processor` for boards with parts. `script`: the actions that
+    booted it. `choices`: values that an input may put, first `values` values of parts, then pins. `to_pc`: characters
+    that the board has sent since the last `begin`, with the tick of their stop bit.
 
-    The first `count` of the `steps` bring it up. Without any it is up when it sleeps, or when its receiver is on and no
-    branch was new for 300 ms; or after `boot_ms`, if that is given. Raises BadInput for firmware that fails meanwhile.
+    The first `count` of the `steps` boot it. Without steps it has booted when it sleeps, or when its receiver is on and
+    no new branch was executed for 300 ms; or after `boot_ms`, if that is given. Raises BadInput for firmware that fails
+    before.
     """
 
     NOT_STATE = ("*",)
@@ -139,7 +140,7 @@ class WiredMachine:
         self.device.put(path, value_of(value), tick)
 
     def begin(self) -> None:
-        """Forgets what the last run left: the state was restored to where inputs begin."""
+        """Resets the records after the state was restored to the start of inputs."""
         board = self.board
         board.faults.clear()
         board.log.cut(0)
@@ -183,12 +184,12 @@ class WiredMachine:
 
     @property
     def heard(self) -> list[tuple[int, int, int]]:
-        """What the serial port received: value, bit RB8, tick of RI."""
+        """Characters that the serial port received: value, bit RB8, tick of RI."""
         return [(value, code, tick) for tick, code, value in self._noted(RECEIVED)]
 
     @property
     def said(self) -> list[tuple[int, int]]:
-        """What it sent: value, tick of TI."""
+        """Characters that the serial port sent: value, tick of TI."""
         return [(value, tick) for tick, _, value in self._noted(SENT)]
 
     def _noted(self, wanted: int) -> list[tuple[int, int, int]]:
@@ -222,7 +223,7 @@ def _let_arrive(world: World) -> None:
 
 
 def choices_of(parts: dict[str, PartKeys]) -> list[Choice]:
-    """All that a test may put, in the order of parts and keys, without types that `choice_of` has no rule for."""
+    """All values that a test may put, in the order of parts and keys, without types unknown to `choice_of`."""
     choices = []
     for name, keys in parts.items():
         for key, kind in keys.PUTS.items():

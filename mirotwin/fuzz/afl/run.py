@@ -1,4 +1,4 @@
-"""One campaign of afl-fuzz: on which cores its jobs run, and why one of them ended."""
+"""One campaign of afl-fuzz: the cores of its jobs, and the reason why one of them ended."""
 
 from __future__ import annotations
 
@@ -24,7 +24,7 @@ def cores_for(jobs: int, proc: Path = Path("/proc")) -> list[int]:
 
 
 def shared_cores(jobs: int) -> list[str]:
-    """A note about more jobs than cores; nothing where there are enough cores."""
+    """A note if there are more jobs than cores; else empty."""
     cores = len(os.sched_getaffinity(0))
     if jobs <= cores:
         return []
@@ -33,7 +33,7 @@ def shared_cores(jobs: int) -> list[str]:
 
 
 def bound(proc: Path) -> Counter[int]:
-    """How many processes are bound to each single core. Kernel threads, which have no memory, are left out."""
+    """Core -> number of processes bound to it alone. Kernel threads, which have no memory, are left out."""
     processes: Counter[int] = Counter()
     for status in proc.glob("[0-9]*/status"):
         try:
@@ -87,15 +87,15 @@ REMEDIES = (
     ("Unable to create", "choose a folder that can be written to"),
     ("Unable to open", "choose a folder that can be read"),
 )
-"""A part of afl-fuzz's line -> what to do about it. The first that fits counts."""
+"""A part of afl-fuzz's error line -> remedy. The first match counts."""
 
 _ELSE = "its whole output is in the file named first"
 
 
 def why_ended(log: Path, target: Path) -> BadInput:
-    """The error to report of an afl-fuzz that ended with one.
+    """The error to report for an afl-fuzz job that ended with one. `log`: its output.
 
-    `log` is its output. `target` is what the target process complained of, if it did: that is the cause then.
+    `target`: messages of the target process; if there are any, they are the cause.
     """
     own = _read(target).strip().splitlines()
     if own:

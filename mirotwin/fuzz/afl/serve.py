@@ -2,17 +2,17 @@
 
     python -m mirotwin.fuzz.afl.serve SPECIFICATION [BESIDE]
 
-SPECIFICATION is the JSON of a `TargetSpec`. BESIDE is a path without ending: `BESIDE.target` gets what went wrong,
-`BESIDE.counts` how many inputs it has run (`engine.counter`).
+SPECIFICATION is the JSON of a `TargetSpec`. BESIDE is a path without suffix: `BESIDE.target` gets error messages,
+`BESIDE.counts` the number of inputs run (`engine.counter`).
 
 AFL++ expects a server that forks a child for each input, and tells its process id and its wait status. Here the target
-puts itself back instead: the id is one that no process has, because AFL++ kills that process when an answer takes too
-long. The wait status is 0, or a signal number for a crash. AFL++ reads the id without a limit of time, so both are
-written at once at the end: it is woken once an input instead of twice, and a slow target is no hang. Hangs are failures
-of the target, which limits virtual time.
+restores its own state instead. It reports an id that no process has, because AFL++ kills that process when an answer
+takes too long. The wait status is 0, or a signal number for a crash. AFL++ reads the id without a limit of time, so
+both are written at once at the end: AFL++ is woken once per input instead of twice, and a slow target is not taken for
+a hang. Real hangs are failures that the target reports itself, as it limits virtual time.
 
-What the four bytes at the start say (`FS_OPT_..` in AFL++ 4's types.h): options are used, the size of the map, and test
-cases come through shared memory (a length of 4 bytes, then as many bytes).
+The four bytes at the start (`FS_OPT_..` in AFL++ 4's types.h) mean: options are used, the size of the map, and test
+cases come through shared memory (a length of 4 bytes, then the bytes).
 """
 
 from __future__ import annotations
@@ -41,7 +41,10 @@ _FAILED = ctypes.c_void_p(-1).value
 
 
 def attach(number: int, size: int) -> memoryview:
-    """The first `size` bytes of a segment, writable. Raises OSError when there is none of this number."""
+    """The first `size` bytes of a shared memory segment, writable.
+
+    Raises OSError if there is no segment of this number.
+    """
     library = ctypes.CDLL(None, use_errno=True)
     library.shmat.restype = ctypes.c_void_p
     library.shmat.argtypes = (ctypes.c_int, ctypes.c_void_p, ctypes.c_int)
@@ -57,15 +60,17 @@ MAP_VARIABLE, CASES_VARIABLE = "__AFL_SHM_ID", "__AFL_SHM_FUZZ_ID"
 
 ENABLED, MAP_SIZE_FOLLOWS, CASES_IN_SHARED_MEMORY = 0x8000_0001, 0x4000_0000, 0x0100_0000
 CASES_BYTES = 4 + (1 << 20)
-"""A length, and as many bytes as AFL++ gives at most (MAX_FILE of its config.h)."""
+"""Size of the shared memory for a test case: its length, then up to AFL++'s largest input (MAX_FILE of its
+config.h).
+"""
 NO_PROCESS = 0x7FFF_FFFE
 """Above the highest process id of Linux (2^22)."""
 
 FIRST_SIGNAL, LAST_SIGNAL = 33, 126
-"""Signals that stand for the kinds of failures 1, 2, ..: none that a program is killed with by accident."""
+"""Signals that encode the failure kinds 1, 2, ..; none of them kills a program by accident."""
 
 NOTHING, FOUND, REFUSED, BROKEN = 0, 1, 2, 70
-"""Exit codes. AFL++ sees none of them: it ends a server by a signal."""
+"""Exit codes. AFL++ does not see them: it ends a server by a signal."""
 RUNS_A_COUNT = 64
 """Executions after which the counters are written again."""
 
@@ -121,7 +126,7 @@ def _is_writable(number: int) -> bool:
 
 
 def run_once(target: Target, data: bytes) -> int:
-    """One run as a person wants to see it: the failure, and the input as lines. Returns the exit code."""
+    """Runs one input for a person: prints the failure, and the input as lines. Returns the exit code."""
     if not target.run(data):
         print("nothing found")
         return NOTHING

@@ -1,4 +1,4 @@
-"""How afl-fuzz is called: its environment, with the reason for each variable, and its options."""
+"""The command line and environment of afl-fuzz, with the reason for each variable."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ from mirotwin.shell.processes import python_module
 
 PROGRAM = "afl-fuzz"
 ANSWER_MS = 10_000
-"""Time for one execution. The server answers at once at its end (`serve`), so that AFL++ never sees it pass."""
+"""Time limit of one execution. The server always answers at once (`serve`), so AFL++ never sees it expire."""
 
 START_MS = 120_000
 """Time for a target to start: Python, the modules and the boot of the firmware, on a machine that does other things."""
@@ -28,22 +28,23 @@ REASONS = {
     "AFL_NO_CRASH_README": "folders hold inputs only",
     "AFL_FORKSRV_INIT_TMOUT": "milliseconds in which the target has to be ready",
 }
-"""Variable -> why the command sets it. Those that only switch something on are 1. None is here that afl-fuzz 4.04c does
-not know: it warns and sleeps 2 s for such a one."""
+"""Variable -> reason. Variables that only switch something on are 1.
+
+All are known to afl-fuzz 4.04c, which for an unknown one would warn and sleep 2 s.
+"""
 
 
 def environment(inherited: Mapping[str, str]) -> dict[str, str]:
-    """The environment of afl-fuzz: what is inherited, and what `REASONS` names. Ours win."""
+    """The environment of afl-fuzz: the inherited one with the variables of `REASONS`, which take precedence."""
     ours = dict.fromkeys(REASONS, "1")
     ours |= {"AFL_MAP_SIZE": str(MAP_SIZE), "AFL_FORKSRV_INIT_TMOUT": str(START_MS)}
     return {**inherited, **ours}
 
 
 def line(given: EngineInput, job: int) -> list[str]:
-    """The command of one of the jobs: the first is the main one, the others take its crashes over.
-
-    Where a seed is given, afl-fuzz takes all inputs for equally fast, so that its choices do not depend on time. Raises
-    BadInput for a folder whose name means something to afl-fuzz.
+    """The command of job number `job`: the first is the main one, the others import its crashes. With a seed, afl-fuzz
+    treats all inputs as equally fast, so that its choices do not depend on time. Raises BadInput for a folder name with
+    a special meaning for afl-fuzz.
     """
     name, (shortest, longest) = job_name(job, given.jobs), given.lengths
     options = ["-i", str(given.seeds), "-o", str(given.out), "-t", str(ANSWER_MS)]
