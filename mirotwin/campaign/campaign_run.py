@@ -90,7 +90,9 @@ def run(options: CampaignOptions) -> int:
 
     To resume an interrupted campaign, give the same command again; only the runs under way are lost (FILE.part.jsonl).
     The file is the same byte for byte on every machine and with any number of jobs; wall times are in
-    FILE.wall.parquet. If no run fails, a line gives the highest failure rate that is still possible at 95 %.
+    FILE.wall.parquet.
+
+    If no run fails, a line gives the highest failure rate that is still possible at 95 %.
 
     Exit code 2: a run has an error; 3: a firmware fault; 1: more runs than allowed_failed_share failed a check, or
     could not be judged by it. The rows name the runs.

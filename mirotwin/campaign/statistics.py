@@ -16,8 +16,10 @@ Mathematical Statistics 7, 1936, doi:10.1214/aoms/1177732502). It is exact for a
 Statistical Association 41, 1946, doi:10.1080/01621459.1946.10501898).
 
 The interval of a mean is wrong where a few runs are far from all others: a sample without such runaways gives no hint
-of them. `python -m benchmarks.intervals` has the figures; medians and counts of higher and lower are valid. Draws come
-from a stream of `miro_exact.rng`, and sums have a fixed order: the same rows give the same digits everywhere.
+of them. `python -m benchmarks.intervals` has the figures; medians and counts of higher and lower are valid.
+
+Draws come from a stream of `miro_exact.rng`, and sums have a fixed order: the same rows give the same digits
+everywhere.
 """
 
 from __future__ import annotations

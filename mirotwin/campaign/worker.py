@@ -48,9 +48,10 @@ class Work(msgspec.Struct, frozen=True):
 
 class RunOutcome(msgspec.Struct, frozen=True, omit_defaults=True):
     """The result of a run. `verdict`: passed, failed (a check or a step), not judged (a named check never applied),
-    fault (of the firmware) or error (no run). `error`: why there are no figures; `traceback`: of a plug-in's error, if
-    requested. `failure`: the first failed check or step, or the check that was not judged. `checks`: name -> verdict.
-    `wall_s`: the simulation loop.
+    fault (of the firmware) or error (no run).
+
+    `error`: why there are no figures; `traceback`: of a plug-in's error, if requested. `failure`: the first failed
+    check or step, or the check that was not judged. `checks`: name -> verdict. `wall_s`: the simulation loop.
     """
 
     run: int

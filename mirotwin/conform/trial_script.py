@@ -208,10 +208,12 @@ class TrialScript:
 
     def say(self, kind: int, payload: bytes, label: str, words: Pairs = (), **how: Unpack[How]) -> Frame:
         """A frame with the number of the last fresh frame plus `step`; it becomes the last fresh one unless `fresh` is
-        false. `lead` replaces its preamble, `layout` the layout byte in its CRC. `wrong`: place -> bits to invert;
-        `bad_stop`: place of a character with a bad stop bit; `pauses`: place -> pause in us before that character.
-        Places count from the first sync byte, the preamble's are negative. `gap_ms`: silence after it. `sealed`:
-        another way to seal it. `slot`: the robot it addresses, if not the first.
+        false.
+
+        `lead` replaces its preamble, `layout` the layout byte in its CRC. `wrong`: place -> bits to invert; `bad_stop`:
+        place of a character with a bad stop bit; `pauses`: place -> pause in us before that character. Places count
+        from the first sync byte, the preamble's are negative. `gap_ms`: silence after it. `sealed`: another way to seal
+        it. `slot`: the robot it addresses, if not the first.
         """
         seq = (self.seq + how.get("step", 1)) % SEQ_MODULUS
         self.seq = seq if how.get("fresh", True) else self.seq

@@ -129,12 +129,13 @@ class PortNetwork(msgspec.Struct, frozen=True):
 
 class RobotPort:
     """The robots at `desk.port`, with the network and the duration of `scenario`. `name`: source of the sent
-    characters, for errors. `note`: gets remarks, a line each. `wire`: characters sent, complete answers, and the
-    characters between them, in order of arrival; its ticks count from the opening, all others from the greeting.
-    `late_ticks`: lateness of each transmission of a schedule. `slots`: robots that answer; `delays`: ticks from each
-    question since the begin of the greeting to the end of its answer. `accepted` and `rejected` of answers count from
-    the greeting, as from a power-on. `prompt`: run with real-time priority. `dropped`: number of characters that came
-    faster than the line can carry.
+    characters, for errors. `note`: gets remarks, a line each.
+
+    `wire`: characters sent, complete answers, and the characters between them, in order of arrival; its ticks count
+    from the opening, all others from the greeting. `late_ticks`: lateness of each transmission of a schedule. `slots`:
+    robots that answer; `delays`: ticks from each question since the begin of the greeting to the end of its answer.
+    `accepted` and `rejected` of answers count from the greeting, as from a power-on. `prompt`: run with real-time
+    priority. `dropped`: number of characters that came faster than the line can carry.
     """
 
     lacks = LACKS

@@ -55,11 +55,12 @@ _BY_TICK = itemgetter(0)
 
 
 class BoardTarget(Target):
-    """`image` on a bare processor, started and idle. `scenario`: the board on its wire. `protocol` makes frames of
-    bodies; without it bodies are sent unchanged. `checks` judge each run; `baud` 0: the rate of the receiver;
-    `after_ticks`: length of a run after its last character. `run(data)` returns 0 or the code of `failure`: a fault, no
-    sleep, or a failed check. `machine`: a started board with parts, instead of the bare processor. Raises BadInput if
-    the firmware does not start.
+    """`image` on a bare processor, started and idle. `scenario`: the board on its wire.
+
+    `protocol` makes frames of bodies; without it bodies are sent unchanged. `checks` judge each run; `baud` 0: the rate
+    of the receiver; `after_ticks`: length of a run after its last character. `run(data)` returns 0 or the code of
+    `failure`: a fault, no sleep, or a failed check. `machine`: a started board with parts, instead of the bare
+    processor. Raises BadInput if the firmware does not start.
     """
 
     def __init__(

@@ -1,5 +1,6 @@
-"""A campaign: collects, judges and triages an engine's inputs until the time is over. This module is one of the few
-that use the wall clock.
+"""A campaign: collects, judges and triages an engine's inputs until the time is over.
+
+This module is one of the few that use the wall clock.
 
     engine ──crashes──► triage: minimised, grouped, confirmed
        └────queue────► coverage, --covering, checks in Python (a share of the time, the rest waits)
@@ -41,9 +42,11 @@ class Covering(msgspec.Struct, frozen=True):
 
 
 class Campaign:
-    """One campaign. `expected`: Python checks run on each input of the queue; `tell` gets each crash at once. `inputs`:
-    examined inputs of the queue; `judged`: inputs judged by the checks, with their `verdicts`; `reached_by`: the stream
-    that reached the wanted function. `until_crash`: end at the first confirmed crash. `show` is called regularly.
+    """One campaign. `expected`: Python checks run on each input of the queue; `tell` gets each crash at once.
+
+    `inputs`: examined inputs of the queue; `judged`: inputs judged by the checks, with their `verdicts`; `reached_by`:
+    the stream that reached the wanted function. `until_crash`: end at the first confirmed crash. `show` is called
+    regularly.
     """
 
     def __init__(

@@ -29,10 +29,11 @@ _COUNT = struct.Struct("<Q")
 
 
 class EngineInput(msgspec.Struct, frozen=True):
-    """Parameters of an engine. `target`: the JSON of a `TargetSpec`. `seeds`: a folder of inputs. `out`: the campaign's
-    folder, created if missing. `dictionary`: a file of words for AFL++. `jobs`: number of processes, each with its own
-    target. `seed`: of the random numbers; None: from the system. `lengths`: shortest and longest input made by AFL++,
-    in bytes.
+    """Parameters of an engine. `target`: the JSON of a `TargetSpec`. `seeds`: a folder of inputs.
+
+    `out`: the campaign's folder, created if missing. `dictionary`: a file of words for AFL++. `jobs`: number of
+    processes, each with its own target. `seed`: of the random numbers; None: from the system. `lengths`: shortest and
+    longest input made by AFL++, in bytes.
     """
 
     target: str

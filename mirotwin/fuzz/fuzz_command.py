@@ -231,8 +231,9 @@ def fuzz(options: FuzzOptions) -> int:
     they start when the firmware sleeps, or when its receiver is on and no new branch was executed for 300 ms; or after
     --boot-ms. The scenario's [expect] judges each input.
 
-    Ctrl-C ends a campaign early and keeps its results. Exit code 1: a failure was found and confirmed, or --covering
-    was not reached.
+    Ctrl-C ends a campaign early and keeps its results.
+
+    Exit code 1: a failure was found and confirmed, or --covering was not reached.
     """
     if options.image is not None and options.image.endswith(".toml"):
         return _fuzz_board(options)

@@ -1,5 +1,6 @@
-"""Converts transmissions to inputs that a target reads back as the same, and defines a campaign's first inputs. In
-`session` pauses keep their length to within a step, and frames become operations, so that a fuzzer changes their
+"""Converts transmissions to inputs that a target reads back as the same, and defines a campaign's first inputs.
+
+In `session` pauses keep their length to within a step, and frames become operations, so that a fuzzer changes their
 content and not their CRC. Characters outside a frame stay characters. Telemetry, robots' answers, switched supplies and
 radios, and bad stop bits of characters outside a frame are left out: a session has no operation for them. `frames`
 contains frames only, `bytes` no pauses.

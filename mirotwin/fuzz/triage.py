@@ -237,8 +237,10 @@ def minimise(
     data: bytes, still: Question, tries: int, time_s: float, tell: Callable[[], None] = lambda: None
 ) -> bytes:
     """The simplest input for which `still` is true, found within `tries` tries and `time_s` seconds of wall time;
-    `data` itself if `still(data)` is false. A shorter input is simpler; of two equally long ones, the one with more
-    zeros. `tell` is called before each try, for a progress line.
+    `data` itself if `still(data)` is false.
+
+    A shorter input is simpler; of two equally long ones, the one with more zeros. `tell` is called before each try, for
+    a progress line.
 
     Delta debugging (Zeller, Hildebrandt: Simplifying and isolating failure-inducing input, IEEE TSE 28(2), 2002), in
     the variant that removes one chunk after the other, from half of the input down to single bytes, then replaces

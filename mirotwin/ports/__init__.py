@@ -1,1 +1,1 @@
-"""Plugs for programs that know nothing of Mirotwin: `miro://` for pyserial, and PTY, TCP and RFC 2217 ports."""
+"""Live ports for other programs: `miro://` for pyserial, and PTY, TCP and RFC 2217 ports."""

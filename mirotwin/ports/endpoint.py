@@ -1,8 +1,8 @@
-"""What all live ports have in common: one client at a time, a bounded buffer towards it, and counts of what passed.
+"""The base of all live ports: one client at a time, a bounded buffer towards it, and byte counts.
 
 Bytes from a client wait in the kernel until the transmit buffer has room, so a client that is too fast is held up, and
-nothing is lost. Bytes for a client that does not read them wait here, 64 KiB of them; what comes then is dropped and
-counted, as by a serial port's driver: the robots do not wait.
+nothing is lost. Up to 64 KiB wait here for a client that does not read; further bytes are dropped and counted, as by a
+serial port's driver, because the robots do not wait.
 """
 
 from __future__ import annotations
@@ -31,7 +31,7 @@ class ByteFifo:
         return len(self.data)
 
     def add(self, data: bytes) -> None:
-        """Appends what there is room for, and drops the rest."""
+        """Appends as much as fits, and drops the rest."""
         room = self.limit - len(self.data)
         self.data += data[:room]
         self.dropped += max(0, len(data) - room)
@@ -48,13 +48,13 @@ class ByteFifo:
 
 CHUNK_BYTES = 4096
 SETTLING_S = 0.2
-"""For so long a program that has opened a port may take to set its rate, before it is told that it is wrong."""
+"""Time for a program to set its rate after it opened a port, before a wrong rate is reported, in seconds."""
 Tell = Callable[[str], object]
 """Takes a line for the user."""
 
 
 class PortContext(NamedTuple):
-    """What all endpoints are made with: their radio, the selector that wakes the session, where reports go."""
+    """Shared objects of all endpoints: the radio, the selector that wakes the session, the receiver of reports."""
 
     port: RadioPort
     selector: BaseSelector
@@ -62,7 +62,7 @@ class PortContext(NamedTuple):
 
 
 class Endpoint:
-    """A port that programs open: its `kind`, `where` it is, and `client`, who is there ("": nobody)."""
+    """A port that programs open: `kind`, address `where`, and `client` ("": none)."""
 
     kind = ""
 
@@ -80,11 +80,14 @@ class Endpoint:
         self._watched = 0
 
     def receive(self) -> bytes:
-        """What the client has sent, at most what the transmit buffer has room for. Notices who comes and goes."""
+        """The bytes that the client has sent, at most the room in the transmit buffer.
+
+        Notices clients that come and go.
+        """
         raise NotImplementedError
 
     def push(self) -> None:
-        """Hands the client as much as it takes."""
+        """Writes as much to the client as it accepts."""
         raise NotImplementedError
 
     def close(self) -> None:
@@ -106,14 +109,14 @@ class Endpoint:
                 self._is_said(self.port.remark_on_sending(baud))
 
     def _is_said(self, remark: str) -> bool:
-        """True if there is a remark, which is told once a client."""
+        """True if there is a remark; it is reported once per client."""
         if remark and remark not in self._remarks:
             self._remarks.add(remark)
             self.tell(f"{self.name}: {self.client or 'the client'} {remark}")
         return bool(remark)
 
     def deliver(self, data: bytes) -> None:
-        """Passes what the PC has received to the client, if one is there."""
+        """Passes characters received by the PC to the client, if there is one."""
         if self.client and data:
             since = self.port.world.tick - self._came_tick
             if (mute := self.port.mute_at(self.baud)) and since < self.port.world.clock * SETTLING_S:
@@ -155,7 +158,7 @@ class Endpoint:
         self.tell(f"{self.name}: {client} is there")
 
     def has_gone(self, why: str = "has gone") -> None:
-        """Forgets what waits for the client."""
+        """Discards the bytes that wait for the client."""
         counted_in, counted_out = self._client_bytes
         lost = len(self.out)
         text = f"{amount(self.bytes_in - counted_in, 'byte')} came from it, {self.bytes_out - counted_out} went to it"

@@ -1,9 +1,8 @@
-"""`miro://` where pyserial looks for it, for programs that name this package themselves:
+"""The pyserial handler of `miro://`, for programs that register this package:
 
     serial.protocol_handler_packages.append("mirotwin.ports")
 
-Programs that know nothing of Mirotwin find the same through `serial.urlhandler.protocol_miro`, which an installation
-puts beside pyserial's own handlers.
+Other programs find it as `serial.urlhandler.protocol_miro`, which the installation puts beside pyserial's own handlers.
 """
 
 from mirotwin.ports.serial_port import Serial as Serial

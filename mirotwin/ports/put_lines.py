@@ -1,8 +1,8 @@
-"""Lines on standard input by which a user of a session acts on a board's parts, and looks at them.
+"""Commands on standard input with which a session's user puts and reads values of a board's parts.
 
-eyes.distance_cm = 30      puts a value, as a test does; it is in the recording, and replayed
+eyes.distance_cm = 30      puts a value, as a test does; it is recorded and replayed
 lcd.text                   shows a value
-?                          shows all values, and what can be put
+?                          shows all values, and those that can be put
 """
 
 from __future__ import annotations
@@ -23,7 +23,10 @@ LONGEST_LINE = 1000
 
 
 class PutLines:
-    """Does what lines of `descriptor` say to the parts of `world`'s board. `show` gets values, `tell` mistakes."""
+    """Executes the command lines of `descriptor` on the parts of `world`'s board.
+
+    `show` gets values, `tell` error messages.
+    """
 
     def __init__(
         self,
@@ -104,7 +107,7 @@ class PutLines:
 def lines_of_stdin(
     world: World, selector: BaseSelector, show: Callable[[str], object], tell: Callable[[str], object]
 ) -> PutLines | None:
-    """Those of standard input, for a board with parts; None where there are none, or nothing to read."""
+    """The command lines of standard input, for a board with parts; None without parts or without input to read."""
     device = world.devices[0]
     if not (isinstance(device, BoardAlone) and device.parts):
         return None

@@ -3,8 +3,8 @@
     bytes to send  ──► transmit buffer, 4096 characters ──► air ──► robots
     bytes received ◄─────────── the PC's receiver ◄─────── air ◄── robots
 
-A character with a bad stop bit is delivered like any other, as serial ports do unless they are set to check; the
-recording knows which had one. Slicer noise reaches robots only: the PC's receiver has a squelch.
+A character with a bad stop bit is delivered like any other, as by a serial port without error checking; the recording
+marks it. Slicer noise reaches robots only: the PC's receiver has a squelch.
 """
 
 from __future__ import annotations
@@ -16,7 +16,7 @@ from miro_sim.world.outbox import INJECTED
 from miro_sim.world.world import World
 
 TRANSMIT_CHARACTERS = 4096
-"""What may wait to be sent: the transmit buffer of a serial port under Linux."""
+"""Capacity of the transmit buffer in characters: that of a serial port under Linux."""
 
 
 class RadioPort:
@@ -34,7 +34,7 @@ class RadioPort:
 
     @property
     def free_tick(self) -> int:
-        """When everything that was given to the port has been sent; the past, if it has."""
+        """Tick at which everything given to the port has been sent; in the past if it has."""
         return self._line.outbox.end_tick(self._line.free_tick())
 
     @property
@@ -53,34 +53,37 @@ class RadioPort:
         return baud == self.baud
 
     def remark_on_sending(self, baud: int) -> str:
-        """What is wrong with a client's rate (0: it has none) for what it sends, and no reason to drop it."""
+        """A remark on a client's rate (0: it has none) that is wrong but does not stop its bytes; "" if it is right."""
         return f"has set another baud rate; the radio has {self.baud}" if baud not in (0, self.baud) else ""
 
     def deaf_to(self, baud: int) -> str:
-        """Why nothing that a client sends at this rate is passed on; "" where it is."""
+        """The reason why bytes from a client that sends at this rate are dropped; "" if they are not."""
         return ""
 
     def mute_at(self, baud: int) -> str:
-        """Why nothing is passed on to a client that receives at this rate; "" where it is."""
+        """The reason why a client that receives at this rate gets nothing; "" if it gets the bytes."""
         return ""
 
     def send(self, data: bytes, at_tick: int = 0, baud: int = 0) -> int:
         """Puts at least one character into the transmit buffer; returns the tick of the first start bit.
 
-        The carrier comes up at the next tick that is settled on no wire: 120 ticks from now, or from `at_tick`.
-        `World.inject` would take the radio's latency off, which is before now for the PC; what it puts on the air
-        before the start of the control period would, replayed, belong to the period before, and the digests would
-        differ.
+        The carrier comes up at the next tick that is not yet settled on any wire: 120 ticks from now, or from
+        `at_tick`. `World.inject` is not used because it subtracts the radio's latency, which gives a time before the
+        present. A transmission before the start of the control period would, when replayed, belong to the period
+        before, and the digests would differ.
         """
         outbox = self._line.outbox
         earliest = max(self.world.tick, at_tick) + SETTLE_TICKS + outbox.lead_ticks
         return self.world.inject(data, self.network, max(earliest, self.free_tick))
 
     def purge(self) -> None:
-        """Takes back what has not begun to be sent."""
+        """Removes characters whose transmission has not begun."""
         outbox = self._line.outbox
         outbox.waiting = [sent for sent in outbox.waiting if sent.origin != INJECTED]
 
     def received(self) -> bytes:
-        """What the PC has received since the last call; to be called before 4096 events at the PC have passed."""
+        """Characters that the PC has received since the last call.
+
+        Call it before 4096 events have occurred at the PC.
+        """
         return bytes(event.value for _, event in self._cursor.read() if event.what == "heard")

@@ -1,9 +1,9 @@
 """A port behind RFC 2217: TCP with telnet negotiation of baud rate, format and lines, as `rfc2217://` speaks.
 
-Format: 8N1 and nothing else, and of a radio 9600 baud; another one is answered with what there is, and the client
-raises. A wire takes any rate until it has one. Flow control, DTR, RTS and BREAK are acknowledged and have no effect: a
-radio module and a wire of three have no such lines, and no break gets through. CTS, DSR and CD are active. Negotiation
-that makes no sense is ignored and counted.
+The format is always 8N1, and a radio's rate 9600 baud; a request for another one is answered with the actual one, and
+the client raises. A wire accepts any rate until it has one. Flow control, DTR, RTS and BREAK are acknowledged and have
+no effect: a radio module and a wire of three have no such lines, and no break gets through. CTS, DSR and CD are active.
+Negotiation that makes no sense is ignored and counted.
 """
 
 from __future__ import annotations
@@ -18,7 +18,7 @@ from mirotwin.ports.sockets import TcpEndpoint
 
 LONGEST_SUBOPTION = 256
 NONSENSE = (struct.error, TypeError, ValueError, KeyError, IndexError)
-"""What `PortManager` raises for a command that is cut short or has values that do not exist."""
+"""Exceptions of `PortManager` for a command that is cut short or has values that do not exist."""
 
 
 class Rfc2217Endpoint(TcpEndpoint):

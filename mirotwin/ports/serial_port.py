@@ -1,6 +1,6 @@
 """`miro://` for pyserial: a robot behind its radio, in the process of the program that opens it.
 
-Each `open` is a robot that is switched on: virtual time begins at 0 and nothing remains of the port's last use.
+Each `open` switches a new robot on: virtual time begins at 0 and nothing remains of the port's last use.
 
     read(n)          time passes until n bytes are there, up to `timeout` (None: for ever), or up to
                      `inter_byte_timeout` after a byte; it stands at the tick at which the last of them was known
@@ -11,7 +11,7 @@ Each `open` is a robot that is switched on: virtual time begins at 0 and nothing
     flush, close     until everything is sent
     sleep, others    none passes
 
-With `realtime=1` it passes by the wall clock instead, also between calls, and calls wait for it.
+With `realtime=1` time follows the wall clock instead, also between calls, and calls wait for it.
 """
 
 from __future__ import annotations
@@ -62,9 +62,9 @@ from mirotwin.shell.outputs import KEPT, RECORDING, OutputFolder
 
 BAUD = 9600
 POLLS = 1000
-"""After so many in a row that find nothing while no time passes, a warning says why."""
+"""Number of polls in a row, without data and without time passing, after which a warning gives the reason."""
 CATCH_UP_S = 0.25
-"""A call that finds the world late works on that for so long; the rest is left to later ones."""
+"""Longest wall time for which one call catches up a late world; later calls continue, in seconds."""
 _log = logging.getLogger("mirotwin.ports")
 
 
@@ -92,7 +92,7 @@ class Serial(SerialBase):  # type: ignore[misc]  # pyserial has no types
 
     @property
     def virtual_tick(self) -> int | None:
-        """Where virtual time stands, for programs that keep time by it; None where it passes by the wall clock."""
+        """The present virtual tick, for programs that keep time by it; None if time follows the wall clock."""
         return self.world.tick if self._pace is None else None
 
     # ---- opening -----------------------------------------------------------------------------------------
@@ -125,7 +125,7 @@ class Serial(SerialBase):  # type: ignore[misc]  # pyserial has no types
         self.is_open = True
 
     def close(self) -> None:
-        """Sends what waits, and ends the control period, so that a recording holds it."""
+        """Sends the waiting bytes, and finishes the control period so that a recording contains it."""
         if not self.is_open:
             return
         try:
@@ -200,7 +200,7 @@ class Serial(SerialBase):  # type: ignore[misc]  # pyserial has no types
         return False
 
     def cancel_read(self) -> None:
-        """The read of another thread, or else the next one, returns what is there."""
+        """The pending read of another thread, or else the next read, returns the available bytes."""
         self._cancel_read = True
 
     def reset_input_buffer(self) -> None:
@@ -240,7 +240,7 @@ class Serial(SerialBase):  # type: ignore[misc]  # pyserial has no types
         self._cancel_write = True
 
     def flush(self) -> None:
-        """Waits until everything is sent. Raises SerialException where the run ends before."""
+        """Waits until everything is sent. Raises SerialException if the run ends before."""
         self._drain(self._write_timeout)
 
     def _drain(self, timeout_s: float | None) -> None:
@@ -262,7 +262,7 @@ class Serial(SerialBase):  # type: ignore[misc]  # pyserial has no types
             return self._radio.waiting
 
     def reset_output_buffer(self) -> None:
-        """Takes back what has not begun to be sent."""
+        """Removes characters whose transmission has not begun."""
         with self._caught_up():
             self._radio.purge()
 
@@ -301,7 +301,9 @@ class Serial(SerialBase):  # type: ignore[misc]  # pyserial has no types
                 raise
 
     def _catch_up(self, world: World) -> None:
-        """By the wall clock, if the port keeps to that; takes over what the PC has received."""
+        """Advances the world to the wall clock, if the port follows it, and collects the characters that the PC has
+        received.
+        """
         if self._pace is not None:
             due = self._pace.tick()
             latest = due + int(CATCH_UP_S * self._pace.factor * TICKS_PER_SECOND)
@@ -362,7 +364,7 @@ class Serial(SerialBase):  # type: ignore[misc]  # pyserial has no types
 
 @contextmanager
 def _recorded(world: World, text: ScenarioText, folder: OutputFolder) -> Iterator[None]:
-    """Records `world` up to the end of a control period."""
+    """Records `world` until the end of a control period."""
     source = source_of(text, world)
     with folder:
         folder.keep = KEPT

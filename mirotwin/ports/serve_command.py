@@ -76,19 +76,20 @@ class ServeOptions(Options, frozen=True, kw_only=True):
 
 @command_of(ServeOptions)
 def serve(options: ServeOptions) -> int:
-    """Runs SCENARIO by the wall clock; programs are its PC. Each port is the serial port of the PC's radio, or of a PC
-    that is wired to a board: SCENARIO may be that of a board, or a board file with --firmware.
+    """Runs SCENARIO in real time; your programs act as its PC. Each port is the serial port of the PC's radio, or of a
+    PC that is wired to a board: SCENARIO may be that of a board, or a board file with --firmware.
 
-    A line on stdout names each port, and `serving` follows. All ports may be used at once, each by one client: all hear
-    the robots, all may send. A port of another network than the first is asked for as PORT@NETWORK or LINK@NETWORK.
+    A line on stdout names each port, and `serving` follows. All ports may be used at once, each by one client: all
+    receive the robots' answers, and all may send. For a port on another network than the first, give PORT@NETWORK or
+    LINK@NETWORK.
 
     Lines on stdin act on a board's parts: `eyes.distance_cm = 30` puts a value, `lcd.text` shows one, `?` all of them.
 
     run.mcap and summary.json are those of `run`; `mirotwin replay run.mcap` sends the same bytes at the same ticks.
-    Ctrl-C and SIGTERM leave run.part.mcap and summary.part.json, which hold all control periods up to then, and
-    case.part.stream: what was sent, as text. So does a check that fails (case.stream).
+    Ctrl-C and SIGTERM leave run.part.mcap and summary.part.json with all control periods so far, and case.part.stream:
+    the sent characters as text. A failed check leaves case.stream.
 
-    Exit code 1: a check failed; 3: the firmware did what it must not.
+    Exit code 1: a check failed; 3: a firmware fault.
     """
     seed = options.seed
     options.plugins.bring()
@@ -148,7 +149,7 @@ def serve(options: ServeOptions) -> int:
 
 
 def _texts(options: ServeOptions) -> tuple[AnyText, AnyText]:
-    """The scenario, whose checks are right for its own duration, and the same as it lasts for a session."""
+    """The scenario with checks for its own duration, and the same with the duration of the session."""
     source, settings = options.scenario, (*options.settings, *as_settings(options.expected))
     if source in builtin_names():
         own = for_session(source, settings)
@@ -162,6 +163,8 @@ def _texts(options: ServeOptions) -> tuple[AnyText, AnyText]:
 
 
 def _leave_case(folder: OutputFolder, run: Run) -> None:
-    """What was sent as one text file, with the check that failed if one did; `mirotwin replay` runs it again."""
+    """Writes the sent characters as a text file, with the failed check if there is one; `mirotwin replay` runs it
+    again.
+    """
     text = run.case() if run.failures else run.stream()
     folder.part(CASE).write_text(text, encoding="utf-8")

@@ -1,10 +1,9 @@
-"""A live session: a world that the wall clock drives, and the ports through which programs talk to robots or a board.
+"""A live session: a world that runs in real time, and the ports through which programs talk to robots or a board.
 
-The world goes on in slices of half a millisecond, and programs get what was sent to them at the end of each. A
-program's bytes go on the air, or on the wire, at the very moment at which they arrive, or, in a world that is behind,
-where its control period ends at the latest. Such a world catches up as fast as it can, and says so: it never skips.
-The tick at which bytes went on the air is what the recording keeps; how they came to arrive then is not needed to run
-it again.
+The world advances in slices of half a millisecond, and programs get their characters at the end of each. A program's
+bytes go on the air, or on the wire, at the moment at which they arrive; if the world is behind, at the end of its
+control period at the latest. Such a world reports that it is late and catches up as fast as it can: it never skips
+time. The recording contains the tick at which bytes went on the air, which is all that a replay needs.
 """
 
 from __future__ import annotations
@@ -22,9 +21,12 @@ from mirotwin.runs.summary import LiveFigures
 FASTEST = 1000.0
 """Virtual seconds in one, at most."""
 LATE_S = 0.020
-"""What counts as late: a little more than the 16 ms for which an adapter of USB may keep a character."""
+"""Threshold of lateness in seconds: a little more than the 16 ms for which a USB adapter may hold a character."""
 SLICE_S = 0.0005
-"""By up to so much answers come late. A comparison at a port allows positions what that lateness explains."""
+"""Largest extra delay of answers in seconds.
+
+A comparison at a port allows positions to differ by the effect of this delay.
+"""
 LONGEST_SLICE_S = 0.020
 
 
@@ -48,14 +50,13 @@ class Pace:
         self._began_s = time.monotonic()
 
     def tick(self) -> int:
-        """Where virtual time should be now."""
+        """The present tick of virtual time by the wall clock."""
         since_s = time.monotonic() - self._began_s
         return self._began_tick + int(since_s * self.factor * self.clock)
 
     def note(self, from_tick: int, to_tick: int, due_tick: int) -> str:
-        """Counts that a world went on from one tick to the other when it should have been at `due_tick`.
-
-        By how much it is behind, for people; "" where it is not late, or not twice as late as last reported.
+        """Counts an advance of the world from `from_tick` to `to_tick`, due at `due_tick`. Returns a message about the
+        lateness; "" if it is not late, or not twice as late as last reported.
         """
         behind = due_tick - to_tick
         self.late_ticks = max(self.late_ticks, behind)
@@ -143,12 +144,14 @@ class Session:
             endpoint.deliver(received[port.network])
 
     def _all_gone(self) -> bool:
-        """Clients were there, none is, and what they sent has been sent: a port is drained when it is closed."""
+        """True if there were clients, all have gone, and their bytes have been sent: closing a port waits for its
+        bytes.
+        """
         came = any(endpoint.clients for endpoint in self.endpoints)
         return came and not any(endpoint.client or endpoint.port.waiting for endpoint in self.endpoints)
 
     def live(self) -> LiveFigures:
-        """What the summary says of the session."""
+        """The session's figures for the summary."""
         return LiveFigures(
             realtime=self.pace.factor,
             late_max_ms=1000.0 * self.pace.late_ticks / self.pace.clock,

@@ -1,4 +1,4 @@
-"""A port behind TCP: the bytes as they are.
+"""A port behind TCP: raw bytes.
 
 A second client is refused: its connection is closed at once and the user is notified. A client that has shut down its
 sending side (`socat - TCP:..` at the end of its input) is there for half a second more, in which it gets answers,
@@ -16,7 +16,9 @@ from mirotwin.ports.endpoint import CHUNK_BYTES, Endpoint, PortContext
 
 LINGER_S = 0.5
 MOST_WIRE_BYTES = 65_536
-"""What may wait in a connection's own words; a client that makes more of them without reading is put out."""
+"""Largest number of waiting protocol bytes of a connection; a client that causes more without reading is
+disconnected.
+"""
 
 
 class TcpEndpoint(Endpoint):
@@ -102,11 +104,11 @@ class TcpEndpoint(Endpoint):
         """A client is there."""
 
     def from_client(self, data: bytes) -> bytes:
-        """What of the client's bytes is for the radio."""
+        """The payload bytes in the client's bytes, for the radio."""
         return data
 
     def to_client(self, data: bytes) -> bytes:
-        """How the radio's bytes go to the client."""
+        """The radio's bytes in the client's protocol."""
         return data
 
     def write(self, data: bytes) -> None:
@@ -146,14 +148,14 @@ class TcpEndpoint(Endpoint):
         self.has_gone(why)
 
     def _watch(self) -> None:
-        """Lets the selector wake for what can be done with the client now."""
+        """Registers the events of the client for which the selector must wake."""
         if self._socket is not None:
             reads = self.port.room > 0 and self._input_over_tick < 0
             self.watch(self._socket, reads, writes=bool(self._wire))
 
 
 def _keep_alive(client: socket.socket) -> None:
-    """A client that vanished without a word is gone after a minute: nobody else could come as long as it is there."""
+    """Enables TCP keep-alive: a vanished client is dropped after a minute, else nobody else could connect."""
     client.setsockopt(socket.SOL_SOCKET, socket.SO_KEEPALIVE, 1)
     for name, value in (
         ("TCP_KEEPIDLE", 30),

@@ -1,9 +1,9 @@
-"""A port as a pseudo-terminal, which programs open as they open /dev/ttyUSB0.
+"""A port as a pseudo-terminal, which programs open like /dev/ttyUSB0.
 
-The kernel tells whether anybody has it open, not how many: two programs that open it share what comes, as they would a
-real port. It is raw, without echo, at 9600 baud or at the rate of the board's file, and made so again whenever it was
-closed; a terminal takes any baud rate, and one that is not that of the line is reported once. What a program has not
-read when it closes is gone.
+The kernel reports only whether anybody has it open, not how many: two programs that open it share the received bytes,
+as on a real port. It is raw, without echo, at 9600 baud or at the rate of the board's file, and made so again whenever
+it was closed; a terminal accepts any baud rate, and one that differs from the line's is reported once. Bytes that a
+program has not read when it closes are lost.
 """
 
 from __future__ import annotations
@@ -36,7 +36,7 @@ RATES = (
     576000,
     921600,
 )
-"""Those that a terminal may have."""
+"""Baud rates that a terminal supports."""
 
 
 class PtyEndpoint(Endpoint):

@@ -1,4 +1,4 @@
-"""What stands in a `miro://` URL.
+"""Parses a `miro://` URL.
 
     miro://SCENARIO?seed=7&firmware=build/mine.ihx&set=network.radio.latency_s=0.002&network=0&realtime=1&limit_s=60&out=DIR
 
@@ -24,7 +24,10 @@ SCHEME = "miro://"
 
 
 class UrlOptions(msgspec.Struct, frozen=True):
-    """What a URL asks for. `realtime`: virtual seconds in a second; 0: time passes in calls. `out` "": no files."""
+    """The options of a URL.
+
+    `realtime`: virtual seconds per second; 0: time passes only in calls. `out` "": no files.
+    """
 
     scenario: str
     seed: int = 0
@@ -37,7 +40,7 @@ class UrlOptions(msgspec.Struct, frozen=True):
 
 
 def parse_url(url: str) -> UrlOptions:
-    """Raises BadInput for a scheme, an option or a value that it does not know, and for an option that stands twice."""
+    """Raises BadInput for an unknown scheme, option or value, and for an option given twice."""
     if not url.lower().startswith(SCHEME):
         raise BadInput(url, "", "is no miro:// URL", f"begin with {SCHEME}SCENARIO")
     name, _, query = url[len(SCHEME) :].partition("?")

@@ -4,9 +4,9 @@
     bytes received ◄────────────────────── TXD, as the board's transmitter sends them
 
 The wire has one rate a session: `[serial] baud` of the board's file, or that of the first port that sends at a rate
-which the receiver takes; a TCP port has none and takes the receiver's own. A receiver of another rate than
-`[serial] baud` gets what comes of that, as on a desk. What a port of another rate would send or receive is not worked
-out: nothing is passed on, and a line says so.
+which the receiver takes; a TCP port has none and takes the receiver's own. A receiver of another rate than `[serial]
+baud` gets wrong characters, as on a desk. A port of another rate is not simulated: it sends and receives nothing, and a
+line reports it.
 """
 
 from __future__ import annotations
@@ -18,7 +18,7 @@ from miro_sim.world.world import World
 from mirotwin.ports.radio_port import TRANSMIT_CHARACTERS, RadioPort
 
 TOLERANCE = 0.045
-"""By so much rates may differ: half a bit in the ten of a character, less what sampling takes of it."""
+"""Largest difference of rates, as a share: half a bit in the ten of a character, less the sampling error."""
 
 
 class WirePort(RadioPort):
@@ -33,7 +33,10 @@ class WirePort(RadioPort):
 
     @property
     def room(self) -> int:
-        """None until the wire has a rate, or the board has switched its receiver on: what comes waits at the port."""
+        """Free characters; 0 until the wire has a rate, or the board has switched its receiver on.
+
+        Until then bytes wait at the port.
+        """
         begun = self.wire.bit_ticks or self._receiver
         return TRANSMIT_CHARACTERS - self.waiting if begun else 0
 

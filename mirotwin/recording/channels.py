@@ -1,13 +1,13 @@
-"""The channels of a recording: their messages, and how records become messages and back.
+"""The channels of a recording: the messages, and their conversion to and from records.
 
 Every message carries its tick; a period's messages are closed by its `/period` message. The topics:
 
 /period                  a control period of the whole world
 /net0/wire               the characters on the air of network 0
-/net0/actions            what was done to its robots and its radio
-/net0/puts               what a test put into the parts of its board
+/net0/actions            actions on its robots and its radio
+/net0/puts               values put into the parts of its board by a test
 /net0/values             the values of these parts, once a period
-/net0/fault              what the firmware of its board did that it must not do
+/net0/fault              firmware faults of its board
 /net0/camera/image       the frames of its camera
 /net0/robot2/lm629       a channel of the robot in slot 2 of network 0
 """
@@ -124,8 +124,9 @@ class ImageMessage(msgspec.Struct, frozen=True, gc=False):
 class TheoryMessage(msgspec.Struct, frozen=True, gc=False):
     """`theory`: terms of the paper's theory.
 
-    f of equation (15) over the period that ends at `tick` (null where nothing was commanded), rho_c, the distance of
-    the heading from across (equation 12, negative where the cosine is), and which assumptions hold (`report.theory`).
+    f of equation (15) over the period that ends at `tick` (null without a command), rho_c, the angle between heading
+    and the perpendicular of the line of sight (equation 12, negative if the cosine is), and the assumptions that hold
+    (`recording.theory`).
     """
 
     tick: int
@@ -165,9 +166,9 @@ class TruthMessage(PostureMessage, frozen=True, gc=False):
 
 
 class ControlMessage(msgspec.Struct, frozen=True, gc=False):
-    """`control`: what the controller answered, see `periods.Control`.
+    """`control`: the controller's output, see `periods.Control`.
 
-    `inner` holds the values that the law names, `estimate` those of the estimator.
+    `inner`: the inner values that the law names; `estimate`: those of the estimator.
     """
 
     tick: int
@@ -224,7 +225,7 @@ class DutyMessage(msgspec.Struct, frozen=True, gc=False):
 
 
 class PwmMessage(msgspec.Struct, frozen=True, gc=False):
-    """`pwm`: what both L298 bridges are driven with."""
+    """`pwm`: the inputs of both L298 bridges."""
 
     tick: int
     left: DutyMessage
@@ -246,7 +247,7 @@ class SampleMessage(msgspec.Struct, frozen=True, gc=False):
 
 
 class FaultMessage(msgspec.Struct, frozen=True, gc=False):
-    """`fault`: what the firmware did that it must not do."""
+    """`fault`: a firmware fault."""
 
     tick: int
     kind: int
@@ -256,7 +257,7 @@ class FaultMessage(msgspec.Struct, frozen=True, gc=False):
 
 
 class WireMessage(msgspec.Struct, frozen=True, gc=False):
-    """`wire`: characters without a pause; `>` host to robot, as sent; `<` robot to host, as the PC received them.
+    """`wire`: characters without a pause; `>` host to robot, as sent; `<` robot to host, as received by the PC.
 
     `data` in hex; `bad_stop`: indices of the characters whose stop bit is bad.
     """
@@ -268,10 +269,9 @@ class WireMessage(msgspec.Struct, frozen=True, gc=False):
 
 
 class ActionMessage(msgspec.Struct, frozen=True, gc=False):
-    """`actions`: what was done to a robot, or (`slot` -1) to the radio or the noise of the network.
-
-    `what` is "reset" or "power" with `value` 0 or 1, the radio "up", "down" or "noise" from then on, or "reseed": from
-    then on the noise is that of seed `value`.
+    """`actions`: an action on a robot, or (`slot` -1) on the radio or the noise of the network. `what`: "reset" or
+    "power" with `value` 0 or 1; "up", "down" or "noise" for the radio; or "reseed": from then on the noise has the seed
+    `value`.
     """
 
     tick: int
@@ -290,7 +290,7 @@ class PutMessage(msgspec.Struct, frozen=True, gc=False):
 
 
 class HardwareMessage(msgspec.Struct, frozen=True, gc=False):
-    """`hardware`: hardware of a robot broke, or was mended; `what` as in a stream file."""
+    """`hardware`: a break or repair of a robot's hardware; `what` as in a stream file."""
 
     tick: int
     slot: int
@@ -306,7 +306,7 @@ class ValuesMessage(msgspec.Struct, frozen=True, gc=False):
 
 
 class PeriodMessage(msgspec.Struct, frozen=True, gc=False):
-    """`/period`: a control period that is over, and the digest of all states up to its end."""
+    """`/period`: the end of a control period, with the digest of all states at its end."""
 
     tick: int
     index: int
@@ -447,9 +447,9 @@ Named = tuple[tuple[str, str], ...]
 
 @cache
 def schema_text(kind: type[msgspec.Struct], inner: Named | None = None) -> bytes:
-    """The JSON schema of messages of a kind, as text; `inner`: what the map in it holds.
+    """The JSON schema of messages of a kind, as text; `inner`: the type of the map in it.
 
-    Made once: it takes longer than some control periods, and many robots have the same channels.
+    Cached: making it takes longer than some control periods, and many robots have the same channels.
     """
     return msgspec.json.encode(IMAGE_SCHEMA if kind is ImageMessage else _schema(kind, inner))
 
@@ -467,9 +467,9 @@ _JSON_TYPES = {str: "string", bool: "boolean"}
 
 
 def _schema(kind: type[msgspec.Struct], inner: Named | None) -> dict[str, object]:
-    """The schema with references resolved: viewers want one plain tree.
+    """The schema with references resolved, because viewers want one plain tree.
 
-    The keys of a map become properties, because viewers offer nothing else to choose from.
+    The keys of a map become properties, because viewers list nothing else.
     """
     (tree,), parts = msgspec.json.schema_components([kind], ref_template="{name}")
     resolved: dict[str, object] = _resolved(tree, parts)

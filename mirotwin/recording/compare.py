@@ -1,12 +1,12 @@
-"""Where two runs differ, period by period: how strictly is a rule's matter.
+"""Compares two runs, period by period; the rule sets the strictness.
 
 rule       compared                                                                  tolerance
 bits       all that a robot did: counters, LM629s, PWM, motion, commands, answers    none
-bytes      the characters that the PC heard of the robots, and their order           in time
+bytes      the characters that the PC received from robots, and their order           in time
 commands   the commands of each LM629: opcode, data, order; not what they read       in time
 wheels     each LM629's positions and desired velocity once a control period         in counts
 
-`answers`, what robots at a port answer beside their twin, is compared in `mirotwin.desk.compare`.
+The rule `answers`, for robots at a port and their twin, is in `mirotwin.desk.compare`.
 """
 
 from __future__ import annotations
@@ -32,16 +32,16 @@ WITHIN_TICKS = 12_000
 WITHIN_COUNTS = 20
 """Default tolerance of positions: 0.15 mm at the wheel, or a sample's way at 0.45 m/s."""
 WITHIN_COUNTS_PER_SAMPLE = 0.25
-"""Default tolerance of desired velocities, 5.6 mm/s: what 6 m/s^2 make of 0.9 ms."""
+"""Default tolerance of desired velocities, 5.6 mm/s: the change at 6 m/s^2 in 0.9 ms."""
 _VELOCITY_UNIT = 65536.0
 
 
 class CompareRule(msgspec.Struct, frozen=True):
     """The rule of a comparison. Differences at ticks from `from_tick` to before `to_tick` (None: the end) count.
 
-    `within_ticks`: of bytes and commands; `within_counts`, `within_counts_per_sample`: of wheels. `host`: also what the
-    PCs did, `digests`: also the digests of the states (both of bits only). `clock`: ticks a second;
-    `period_ticks`: of one control period.
+    `within_ticks`: of bytes and commands; `within_counts`, `within_counts_per_sample`: of wheels. `host`: compare the
+    PCs, too; `digests`: compare the digests of the states, too (both for `bits` only). `clock`: ticks per second;
+    `period_ticks`: ticks of a control period.
     """
 
     kind: Kind = "bits"
@@ -56,7 +56,7 @@ class CompareRule(msgspec.Struct, frozen=True):
     period_ticks: int = CONTROL_PERIOD_TICKS
 
     def compared(self, periods: Sequence[Period]) -> int:
-        """How many of the control periods have a part in the window."""
+        """Number of control periods that overlap the window."""
         to_tick = NEVER_TICK if self.to_tick is None else self.to_tick
         return sum(
             self.from_tick < period.tick + self.period_ticks and period.tick < to_tick for period in periods
@@ -85,9 +85,8 @@ def only_robots(periods: Sequence[Period], robots: Sequence[RobotId]) -> Sequenc
 def differences(
     recorded: Sequence[Period], replayed: Sequence[Period], rule: CompareRule = EXACT
 ) -> list[Difference]:
-    """All differences of two runs under a rule, in the order of time, as far as both go.
-
-    Both runs have the same robots, in the same order. What is under way where the shorter one ends is not compared.
+    """All differences of two runs under a rule, in the order of time, up to the end of the shorter one. Both runs must
+    have the same robots, in the same order. Commands and characters unfinished at that end are not compared.
     """
     periods = min(len(recorded), len(replayed))
     if not periods:
@@ -165,7 +164,9 @@ def _wheels(robot: RobotPeriod, twin: RobotPeriod, rule: CompareRule) -> Named:
 def _commands(
     recorded: Sequence[Period], replayed: Sequence[Period], rule: CompareRule
 ) -> Iterator[Difference]:
-    """Commands are known up to the last exposure: one that comes later in one run may not have been recorded."""
+    """Differences of commands, up to the last exposure: a command after it may not have been recorded in one of the
+    runs.
+    """
     exact = rule.kind == "bits"
     within_ticks = 0 if exact else rule.within_ticks
     known_tick = NEVER_TICK if exact else recorded[-1].tick - within_ticks
@@ -177,7 +178,7 @@ def _commands(
 
 
 def _air(recorded: Sequence[Period], replayed: Sequence[Period], rule: CompareRule) -> Iterator[Difference]:
-    """Characters are known once their stop bits were sampled."""
+    """Differences of characters; a character is known when its stop bit was sampled."""
     within_ticks = rule.within_ticks if rule.kind == "bytes" else 0
     end_tick = recorded[-1].tick + rule.period_ticks
     robots = {robot.network for robot in recorded[0].robots}

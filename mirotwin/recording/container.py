@@ -1,16 +1,17 @@
-"""The records of an MCAP file one after the other, as far as the file goes, and every byte of it checked.
+"""Reads the records of an MCAP file in order, to the end of a complete or truncated file, and checks every byte.
 
-The library's own reader takes a file that was cut short for a damaged one and gives nothing of a chunk whose end is
-missing (a short recording is one chunk); it checks neither attachments nor the summary. Here the whole records of
-such a chunk are given out before the error, and a bit that was turned over anywhere in a recording of ours is
-noticed: chunks and attachments have a CRC each, DataEnd has one of all before it, Footer one of the rest (MCAP
-specification, "Records"). A CRC of 0, which other programs write, says nothing.
+The library's own reader rejects a truncated file as damaged and yields nothing of a chunk whose end is missing (a short
+recording is one chunk); it checks neither attachments nor the summary. This reader yields the complete records of such
+a chunk before the error, and detects any flipped bit in our recordings: chunks and attachments have a CRC each, DataEnd
+has one of all before it, Footer one of the rest (MCAP specification, "Records"). A CRC of 0, which other programs
+write, is not checked.
 
-A file without an end that stops between two records, or in one that belongs into a chunk and stands outside, is what a
-killed process leaves (`writer`): BrokenOff. One that stops in a chunk or anywhere else is a part of a copy: Cut.
+A file without an end that stops between two records, or in a record that belongs into a chunk but lies outside, was
+left by a killed process (`writer`): BrokenOff. A file that stops in a chunk or anywhere else is an incomplete copy:
+Cut.
 
-Compressed chunks are refused: `mirotwin run` writes none, and 96 KB of them can hold gigabytes. So nothing that is read
-here grows: what comes out of a record is no longer than the record, and a chunk within a chunk is damage.
+Compressed chunks are refused: `mirotwin run` writes none, and 96 KB of them can hold gigabytes. So memory is bounded:
+the content of a record is no longer than the record, and a chunk within a chunk is damage.
 """
 
 from __future__ import annotations
@@ -46,7 +47,7 @@ _BAD = (McapError, struct.error, ValueError, KeyError, MemoryError, OverflowErro
 
 
 class RecordingError(BadInput):
-    """A file that is no whole recording: `path`, `place` (byte offset), what, remedy."""
+    """A file that is no complete recording: `path`, `place` (byte offset), reason, remedy."""
 
 
 class Cut(RecordingError):
@@ -54,18 +55,17 @@ class Cut(RecordingError):
 
 
 class BrokenOff(Cut):
-    """A file whose writer was ended; all that it had written came before, except for a part of a record."""
+    """A file whose writer was killed; everything written came before, except for a part of a record."""
 
 
 class _Compressed(Exception):
-    """A chunk that is compressed, and by what."""
+    """A compressed chunk, with the name of the compression."""
 
 
 class Records:
     """Iterates over (offset, record) of schemas, channels, messages, attachments and metadata of a file. Raises
-    RecordingError where it cannot go on.
-
-    `read`: gives the next so many bytes, fewer only at the end. `path` names the file in errors.
+    RecordingError where reading cannot continue. `read(n)`: returns the next n bytes, fewer only at the end. `path`
+    names the file in errors.
     """
 
     def __init__(self, read: Callable[[int], bytes], path: str) -> None:
@@ -182,7 +182,7 @@ def _in(opcode: int, body: bytes, whole: bool) -> Iterator[McapRecord]:
 
 
 def _in_chunk(body: bytes, whole: bool) -> Iterator[McapRecord]:
-    """The records of a chunk, those that are whole if the file ends in it."""
+    """The records of a chunk; only the complete ones if the file ends in it."""
     if len(body) < _CHUNK.size:
         if whole:
             raise ValueError("a chunk is too short")

@@ -45,9 +45,9 @@ def decode(options: DecodeOptions) -> int:
     """Decodes FILE (standard input for -) and prints one line a frame or damaged run of bytes.
 
     FILE may be a recording (run.mcap), a stream file, or a capture of a serial line by another tool: pcapng, pcap,
-    tables and sessions of logic analysers, logs of hex digits, dumps, raw bytes. Its beginning tells which, and a line
-    on stderr says so. A capture that is cut short or damaged is reported with the place, after everything before it,
-    and the exit code is 2.
+    tables and sessions of logic analysers, logs of hex digits, dumps, raw bytes. The format is detected from its
+    beginning and reported on stderr. A capture that is cut short or damaged is reported with the place, after
+    everything before it, and the exit code is 2.
     """
     with Input(options.file) as given:
         source = open_capture(given, complain, options.capture)

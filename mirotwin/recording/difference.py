@@ -15,15 +15,15 @@ WORDS = ("recorded", "replayed")
 
 
 DIGEST = "digest"
-"""The channel of the states' digests. A digest may differ where nothing that is recorded does."""
+"""The channel of the states' digests. A digest may differ although no recorded value does."""
 
 
 class Difference(msgspec.Struct, frozen=True):
     """A value of two runs at `tick`, in control period `period`.
 
-    `channel` as in a recording, with the field: `lm629 left status`, `wire`. `slot` -1: of a whole network; `network`
-    -1: of the whole world. `recorded`, `replayed`: numbers, or text for characters and commands; None: nothing there.
-    `clock`: ticks a second.
+    `channel` as in a recording, with the field: `lm629 left status`, `wire`. `slot` -1: the whole network; `network`
+    -1: the whole world. `recorded`, `replayed`: numbers, or text for characters and commands; None: missing. `clock`:
+    ticks per second.
     """
 
     tick: int
@@ -48,7 +48,7 @@ class Difference(msgspec.Struct, frozen=True):
         return shown(self.recorded), shown(self.replayed)
 
     def line(self, names: tuple[str, str] = WORDS) -> str:
-        """One line; `names` of the two runs."""
+        """The difference in one line; `names`: of the two runs."""
         recorded, replayed = self.values()
         values = f"{names[0]} {recorded}, {names[1]} {replayed}"
         return f"{moment(self.tick, self.clock)}, {self.topic}: {values}"

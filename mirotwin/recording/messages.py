@@ -1,4 +1,4 @@
-"""The messages of a recording one after the other, and what it was made from: the one reader of our MCAP files."""
+"""The messages of a recording in order, and its metadata and attachments: the only reader of our MCAP files."""
 
 from collections.abc import Callable, Collection, Iterator
 from typing import Any
@@ -26,11 +26,12 @@ AGAIN = "record the run again"
 
 
 class Messages:
-    """Iterates over (topic, message) of those of `kinds` (default: all). Raises RecordingError where it cannot go on.
+    """Iterates over (topic, message) of those of `kinds` (default: all). Raises RecordingError where reading cannot
+    continue.
 
-    `read` and `path` as in `Records`. `metadata` (None: not a recording of this program) and `attachments` stand at the
-    beginning of a file and are there with the first message; `serial`, about the line of a board, comes later, or not
-    at all. `broken_off`: what to say of a run that was.
+    `read` and `path` as in `Records`. `metadata` (None: not a recording of this program) and `attachments` are at the
+    beginning of a file and known with the first message; `serial`, about a board's line, comes later, or not at all.
+    `broken_off`: message about an interrupted run, else "".
     """
 
     def __init__(
@@ -89,12 +90,12 @@ class Messages:
                 raise self.error(f"recording format {recorded_format!r}", remedy)
 
     def drain(self) -> None:
-        """Reads to the end. Raises RecordingError for what the container's checksums say about the rest."""
+        """Reads to the end. Raises RecordingError if a checksum of the rest is wrong."""
         for _ in self._records:
             pass
 
     def check_ours(self) -> None:
-        """Raises RecordingError unless what was read is a recording of this program."""
+        """Raises RecordingError unless the content so far is a recording of this program."""
         if self.metadata is None:
             reason = "an MCAP file, but not a recording of this program"
             raise self.error(reason, "give a run.mcap that it wrote")
@@ -103,11 +104,11 @@ class Messages:
         return RecordingError(self.path, f"offset {self.offset}", reason, remedy)
 
     def unfit(self, error: Exception) -> RecordingError:
-        """The last message cannot be what it says."""
+        """The error for a last message with impossible content."""
         return self.error(f"{self._topic}: {brief(error)}", AGAIN)
 
 
 def brief(error: Exception) -> str:
-    """One line about an error."""
+    """The text of an error in one line."""
     text = f"{error}".strip()
     return text.splitlines()[0] if text else type(error).__name__

@@ -1,7 +1,7 @@
-"""Reads a recording back: what it was made from, and its control periods as the world left them.
+"""Reads a recording: its sources and its control periods.
 
-A file is read whole and checked (CRCs, schema) before anything is returned. Of one that has no end, the whole control
-periods are returned.
+A file is read completely and checked (CRCs, schema) before anything is returned. Of a file without an end, the complete
+control periods are returned.
 """
 
 import re
@@ -35,7 +35,7 @@ KINDS = tuple(kind for kind in (*ROBOT_CHANNELS.values(), *OTHER_CHANNELS.values
 
 
 class Recording(msgspec.Struct, frozen=True):
-    """A run that was recorded. `broken_off`: what to say of one that does not go to its end, else empty."""
+    """A recorded run. `broken_off`: message about an interrupted run, else empty."""
 
     source: RunSource
     periods: tuple[Period, ...]
@@ -76,9 +76,8 @@ def parse(data: bytes, path: str) -> Recording:
 
 
 class _Collector:
-    """Puts messages of a robot together by channel, until `/period` closes the period.
-
-    `resumed`: whether the run went on from a saved world, known with the first message: its first period is any.
+    """Collects a robot's messages by channel until `/period` closes the period. `resumed`: the run continued a saved
+    world, known with the first message; its first period may have any number.
     """
 
     def __init__(self, resumed: Callable[[], bool]) -> None:

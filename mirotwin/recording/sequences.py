@@ -1,4 +1,4 @@
-"""What happens in a run one after the other, with ticks: LM629 commands and characters on the air."""
+"""The events of a run in order, with ticks: LM629 commands and characters on the air."""
 
 from __future__ import annotations
 
@@ -30,9 +30,9 @@ Pair = tuple[LogEntry | None, LogEntry | None]
 
 
 def commands(periods: Sequence[Period], index: int, side: str, answers: bool) -> list[LogEntry]:
-    """Complete commands to one LM629 of the robot in place `index`; with `answers` also what it gave back.
+    """Complete commands to one LM629 of the robot at `index`; `answers`: with the data read back.
 
-    What a chip answers, a position say, depends on when it was read.
+    Data such as a position depends on the time of reading.
     """
     logged = (command for period in periods for command in getattr(period.robots[index], side).commands)
     return [LogEntry(tick, _command(opcode, data, answers)) for tick, opcode, data in logged]
@@ -109,10 +109,9 @@ def unlike(entries: Sequence[LogEntry], others: Sequence[LogEntry], within_ticks
 def pairs(
     entries: Sequence[LogEntry], others: Sequence[LogEntry], within_ticks: int, same_ticks: int = SAME_TICKS
 ) -> Iterator[Pair]:
-    """All of both, in the order of time; None stands where one side has nothing.
-
-    Two that say the same are one if they are at most `same_ticks` apart. After a pair that is not alike the
-    comparison goes on after it: what is missing on one side shifts nothing.
+    """Pairs the entries of both sides in the order of time; None if one side has no partner. Entries with equal text
+    are a pair if they are at most `same_ticks` apart. After an unequal pair the comparison continues: a missing entry
+    on one side does not shift the others.
     """
     first = second = 0
     while first < len(entries) and second < len(others):

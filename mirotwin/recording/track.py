@@ -1,7 +1,7 @@
-"""What each robot did in a run, as columns of numbers: what summary, figures, pages and campaigns are made from.
+"""The motion of each robot in a run, as columns of numbers, for summary, figures, pages and campaigns.
 
-A run of hours has 100 000 periods an hour: a record of a period is some 3 KB, its row in these columns some 200
-bytes. A column is an `array`, which grows; `numpy.asarray` reads it without a copy. What a row does not have is NaN.
+A run of hours has 100 000 periods an hour: a record of a period is some 3 KB, its row in these columns some 200 bytes.
+A column is an `array`, which grows; `numpy.asarray` reads it without a copy. Missing values are NaN.
 
 Errors are truth against the reference at the same tick, e = c - r in the paper's axes, heading wrapped to (-pi, pi].
 """
@@ -30,7 +30,7 @@ SETTLED_CM = 3.0
 SETTLED_RAD = 0.15
 NAN = math.nan
 LONGEST_FRAMES = 40
-"""More than any camera's delay: a reference is held for as long."""
+"""Frames for which a reference is held; more than any camera's delay."""
 
 Column: TypeAlias = "array[float]"
 
@@ -104,7 +104,7 @@ class Postures:
         self.theta_rad.append(NAN if posture is None else posture.theta_rad)
 
     def points_cm(self) -> tuple[list[float], list[float]]:
-        """x and y of those that are there."""
+        """x and y of the points that exist."""
         there = [(x, y) for x, y in zip(self.x_m, self.y_m, strict=True) if not math.isnan(x)]
         return [100.0 * x for x, _ in there], [100.0 * y for _, y in there]
 
@@ -124,8 +124,8 @@ class MeasuredErrors(TrackingErrors):
     """Tracking errors as the PC could plot them: measurements against the reference at their exposure.
 
     A measurement arrives some frames after its exposure. It is compared with the reference at the exposure, so a delay
-    by itself is no error: this is the best that a laboratory without another camera can plot. `delay_frames`: of a
-    camera whose measurements bear no tick; without it they stay empty.
+    alone is no error: a laboratory without another camera can plot nothing better. `delay_frames`: delay of a camera
+    whose measurements have no tick; without it the columns stay empty.
     """
 
     def __init__(self, delay_frames: int | None) -> None:
@@ -153,7 +153,7 @@ class MeasuredErrors(TrackingErrors):
 
 
 class RobotTrack:
-    """One robot: where it was, should have been and was measured; the errors in truth, and of the measurements.
+    """One robot: true, reference and measured postures; true errors, and errors of the measurements.
 
     `delay_frames` as in `MeasuredErrors`. `theory`: filled by `Tracks`.
     """
@@ -189,7 +189,7 @@ class Tracks:
             self.add(period)
 
     def add(self, period: Period) -> None:
-        """Takes over what is needed of the next control period."""
+        """Adds the next control period."""
         for robot in period.robots:
             robot_id = (robot.network, robot.slot)
             track = self.robots.get(robot_id)
@@ -203,7 +203,7 @@ class Tracks:
         self.digest = period.digest
 
     def theories(self) -> Iterator[tuple[int, int, TheoryMessage]]:
-        """Network, slot and what the theory says of each steered robot in the period that was added last."""
+        """Network, slot and theory values of each steered robot in the period that was added last."""
         for (network, slot), track in self.robots.items():
             if track.theory.now is not None:
                 yield network, slot, track.theory.now

@@ -1,13 +1,12 @@
-"""Writes an MCAP file, uncompressed, which can be read at any moment of its making.
+"""Writes an uncompressed MCAP file that is readable at any moment while it is written.
 
-A finished file is the bytes that `mcap.writer.Writer` gives without compression and with all checksums. That one keeps
-a chunk in memory until it has 1 MiB, minutes of a run, and a process that is killed loses it. To end chunks sooner it
-has no public call, a chunk for each control period makes files longer by a quarter, and a message takes it 5 to 9 times
-as long as `rows`. Here `flush` brings the
-open chunk up to date in the file: first the new records at the end of the file, then the head of the chunk (lengths,
-times, CRC), which now takes them in. A file that ends anywhere in between has whole records outside of a chunk at its
-end, which the specification allows, and perhaps a part of one. Where chunks end depends on the messages only, so
-flushing changes no byte of a finished file.
+A finished file is the bytes that `mcap.writer.Writer` gives without compression and with all checksums. That writer
+holds a chunk in memory until it has 1 MiB, minutes of a run, and a killed process loses it. It has no public call to
+end a chunk sooner; a chunk for each control period makes files a quarter longer; and it needs 5 to 9 times as long per
+message as `rows`. Here `flush` updates the open chunk in the file: first it writes the new records at the end of the
+file, then the head of the chunk (lengths, times, CRC), which then includes them. A file that ends between these steps
+has complete records outside of a chunk at its end, which the specification allows, and perhaps a part of one. Where
+chunks end depends on the messages only, so flushing changes no byte of a finished file.
 """
 
 from __future__ import annotations
@@ -33,11 +32,11 @@ _CRC = 4  # bytes
 
 
 class McapWriter:
-    """A file under way. `stream` is empty and seekable, and may be a raw file; the caller closes it. Messages are added
-    to `chunk`.
+    """An open MCAP file. `stream` must be empty and seekable, and may be a raw file; the caller closes it. Messages are
+    added to `chunk`.
 
     Attachments and metadata come before the first message, or end the chunk that is open. After an OSError (a full
-    disk) nothing more is written: what there is can be read.
+    disk) nothing more is written; the file stays readable.
     """
 
     def __init__(self, stream: BinaryIO, profile: str, library: str) -> None:
@@ -92,7 +91,7 @@ class McapWriter:
         return number
 
     def flush(self) -> None:
-        """Brings everything so far into the file, so that it outlives this process."""
+        """Writes everything so far into the file, so that it survives the end of this process."""
         # Schemas and channels alone are no chunk: the library's writer would not have written one.
         if self.chunk.indexes:
             self._store_chunk()

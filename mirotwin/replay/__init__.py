@@ -1,8 +1,8 @@
-"""Replay: the script of a recording or stream, where two runs differ, and what made them.
+"""Replay: the script of a recording or stream, and the first difference of two runs with its cause.
 
     difference = mirotwin.replay.first_difference(one, other)    # two worlds: tick, field, both values
 
-The names are those of the stub beside this file, loaded on first use as those of `mirotwin` are.
+The names of the stub beside this file are loaded on first use, like those of `mirotwin`.
 """
 
 from mirotwin import names_of_stub

@@ -1,4 +1,4 @@
-"""`mirotwin diff`: two recordings, or what two firmwares do, and where they differ first."""
+"""`mirotwin diff`: the first difference of two recordings, or of one run with two firmwares."""
 
 from __future__ import annotations
 
@@ -90,14 +90,14 @@ class DiffOptions(Options, frozen=True, kw_only=True):
 
 @command_of(DiffOptions)
 def diff(options: DiffOptions) -> int:
-    """Compares the recordings A and B (run.mcap, or a run's folder): what they were made from, then all they hold. Or
-    the firmware images A and B: what robots do with each of them, in a scenario or under the bytes of a stream.
+    """Compares the recordings A and B (run.mcap, or a run's folder): their sources, then their content. Or the firmware
+    images A and B: the behaviour of robots with each of them, in a scenario or under the bytes of a stream.
 
-    `bits` compares what the PCs did as well, and in recordings the digests of the states. Where both can be run again,
-    the first tick is looked for at which their states differ, with the fields that do; and with two firmwares the
-    first instruction.
+    `bits` compares the PCs, too, and in recordings the digests of the states. If both runs can be repeated, the first
+    tick with a difference of their states is searched, with the fields that differ; with two firmwares also the first
+    instruction.
 
-    Exit code 4 when the runs differ, 0 when they are the same, whatever they were made from.
+    Exit code 4: the runs differ; 0: they are the same, from the same sources or not.
     """
     compare = options.compare
     if compare.kind == "answers":
@@ -133,7 +133,10 @@ def diff(options: DiffOptions) -> int:
 
 
 def _are_images(options: DiffOptions) -> bool:
-    """True if A and B are, not recordings. Raises BadInput where one is, and for options that are for images."""
+    """True if A and B are images, False for recordings.
+
+    Raises BadInput for one of each, and for image options with recordings.
+    """
     paths = file_in(options.a), file_in(options.b)
     images = [path for path in paths if _is_image(path)]
     if len(images) == 1:
@@ -231,7 +234,9 @@ def _with_same_robots(first: ComparedRun, other: ComparedRun) -> tuple[ComparedR
 
 
 def _rule(rule: CompareRule, run: ComparedRun, other: ComparedRun) -> tuple[CompareRule, list[str]]:
-    """With what only recordings are compared in; and why digests are not, if they should."""
+    """The rule for two recordings, with remarks: the reason why digests are not compared although the rule
+    asks for it.
+    """
     bits, recorded = rule.kind == "bits", run.recorded
     digests = bits and recorded and run.state == other.state  # they are of states of one form
     why = "their states have another form, by scenario or version of this program"

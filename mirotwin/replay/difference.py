@@ -1,4 +1,6 @@
-"""Where two runs differ first: control period, tick, fields of the state, and with two firmwares the instruction."""
+"""The first difference of two runs: control period, tick, fields of the state, and with two firmwares the
+instruction.
+"""
 
 from __future__ import annotations
 
@@ -27,10 +29,9 @@ Annotate = Callable[[Image], AnnotatedImage]
 
 
 class ComparedRun(msgspec.Struct, frozen=True):
-    """One of two runs. `periods`: what it did; `ways`: how it may be repeated, none where that cannot be.
-
-    `recorded`: a way repeats it only if it gives the digests of `periods` again. `state`: the form of the states, and
-    `plugins` that it used, as its recording has them. `notes`: what else there is to say of it.
+    """One of two runs. `periods`: its control periods; `ways`: possible ways to repeat it, empty if there are none.
+    `recorded`: a repetition is accepted only if it gives the digests of `periods`. `state`: the form of the states, and
+    `plugins`, both from its recording. `notes`: remarks for the user.
     """
 
     periods: Sequence[Period]
@@ -58,9 +59,9 @@ class ComparedRun(msgspec.Struct, frozen=True):
 
 
 class RunDifference(msgspec.Struct, frozen=True):
-    """Where two runs, called `names`, differ. `differences`: of what they did, in the order of time. `state` and
-    `instruction` were found by repeating both; `notes`: what could not be done, and why.
-    `alone`: they are of a board without a robot. `rule`: what counts.
+    """The differences of two runs, called `names`. `differences`: in the order of time. `state` and `instruction`:
+    found by repeating both; `notes`: failed steps with reasons. `alone`: the runs are of a board without a robot.
+    `rule`: of the comparison.
     """
 
     names: tuple[str, str] = WORDS
@@ -78,7 +79,9 @@ class RunDifference(msgspec.Struct, frozen=True):
 
     @property
     def observed_tick(self) -> int:
-        """When something differs that is more than a digest: dead bytes of a stack are enough for that."""
+        """Tick of the first difference that is more than a digest; unused bytes of a stack are enough to change a
+        digest.
+        """
         ticks = [each.tick for each in self.differences if each.channel != DIGEST]
         return (ticks or [self.differences[0].tick])[0]
 
@@ -117,10 +120,9 @@ def compare_runs(
     names: tuple[str, str] = WORDS,
     only_firmware: bool = True,
 ) -> RunDifference:
-    """Compares what two runs did, and where that differs repeats both for tick, fields and instruction.
-
-    `annotate`: finds the debug files of their images. `only_firmware`: apart from that they were made alike, so that
-    its first changed instruction is looked for.
+    """Compares two runs; if they differ, repeats both to find tick, fields and instruction. `annotate`: finds the debug
+    files of their images. `only_firmware`: the runs differ in their firmware only, so the first changed instruction is
+    searched.
     """
     difference = RunDifference(names, differences(run.periods, other.periods, rule), rule=rule)
     if not difference.differences:

@@ -34,13 +34,13 @@ _APPLIES = {
 
 
 def refuse_given(file: str, reason: str, given: Sequence[str]) -> None:
-    """Raises BadInput for the first of the options that were given and mean nothing here."""
+    """Raises BadInput for the first given option, because it does not apply here (`reason`)."""
     if given:
         raise BadInput(file, given[0], reason, "leave it out")
 
 
 class CompareOptions(Options, frozen=True, kw_only=True):
-    """How to compare and what to print."""
+    """Options of a comparison and of its output."""
 
     kind: Annotated[
         Kind,
@@ -94,7 +94,7 @@ class CompareOptions(Options, frozen=True, kw_only=True):
         window(self.from_time, self.to_time)
 
     def rule(self, clock: int = TICKS_PER_SECOND) -> CompareRule:
-        """The comparison that the options describe, of worlds with so many ticks a second."""
+        """The rule of comparison from these options, for worlds with `clock` ticks per second."""
         ms, counts, per_sample = self.within_ms, self.within_counts, self.within_counts_per_sample
         from_tick, to_tick = window(self.from_time, self.to_time, clock)
         usual_ticks = ANSWERS.within_ticks if self.kind == "answers" else WITHIN_TICKS
@@ -126,7 +126,7 @@ class CompareOptions(Options, frozen=True, kw_only=True):
 
 
 def check_reaches(rule: CompareRule, file: str, recorded: Sequence[Period]) -> None:
-    """Raises BadInput for a window that begins where the recording has ended, or ends where it begins."""
+    """Raises BadInput for a window that begins after the end of the recording, or ends at or before its begin."""
     first, last = recorded[0], recorded[-1]
     end_tick = last.tick + rule.period_ticks
     if rule.from_tick >= end_tick:
@@ -138,7 +138,7 @@ def check_reaches(rule: CompareRule, file: str, recorded: Sequence[Period]) -> N
 
 
 def extent(rule: CompareRule, periods: Sequence[Period]) -> str:
-    """How much of these was compared, and how: `all 6 control periods (commands, within 0.5 ms)`."""
+    """The compared part and the rule as text: `all 6 control periods (commands, within 0.5 ms)`."""
     whole = f"all {amount(rule.compared(periods), 'control period')}"
     if rule.kind in _APPLIES["within_ms"]:
         return f"{whole} ({rule.kind}, within {1000 * rule.within_ticks / rule.clock:.4g} ms)"

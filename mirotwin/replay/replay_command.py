@@ -1,4 +1,4 @@
-"""`mirotwin replay`: what was sent, sent again, and whether the robot answers as it did."""
+"""`mirotwin replay`: sends the recorded bytes again and compares the robot's reaction."""
 
 from __future__ import annotations
 
@@ -86,33 +86,33 @@ class ReplayOptions(CaseOptions, frozen=True, kw_only=True):
 
 @command_of(ReplayOptions)
 def replay(options: ReplayOptions) -> int:
-    """Sends the bytes of FILE again and compares what the robot does.
+    """Sends the bytes of FILE again and compares the robot's reaction.
 
     FILE is a run.mcap, a text stream, a capture of a serial line, or the folder of a run or of a failed test.
 
     Exit code 4 when it differs from the recording; if a firmware fault comes of it too, the code is 4. The first
-    difference is printed on stderr, and the first of each channel in a table. Where the runs differ, both are repeated
-    to find the first tick and field in which their states do, and with another --firmware the first instruction.
+    difference is printed on stderr, and the first of each channel in a table. If the runs differ, both are repeated to
+    find the first tick and field in which their states differ, and with another --firmware the first instruction.
 
-    A recording that was broken off, or a part of one, is compared as far as it goes, with a note. A text stream runs
-    over an ideal link in the default scenario, and there is nothing to compare. So does a capture of any form that
-    `mirotwin decode` reads; one without times needs --assume-contiguous.
+    An interrupted recording, or a part of one, is compared to its end, with a note. A text stream runs over an ideal
+    link in the default scenario, and there is nothing to compare. So does a capture of any form that `mirotwin decode`
+    reads; one without times needs --assume-contiguous.
 
     A case (a stream with `verdict` in its header) runs to its end, and the exit code is that of the check that failed:
     1, or 3 for a firmware fault. 0: fixed by your change of firmware or settings. 4: it no longer fails, unchanged.
     A case of `mirotwin fuzz --bare` needs --firmware, and --expect FILE.py:CLASS if its check is in a file.
 
-    Where --expect is given, that decides: a difference is only reported, and the exit code is 1 if a check fails, else
-    0.
-    What the recorded scenario expects is judged too, but a difference goes before it.
+    With --expect those checks decide: a difference is only reported, and the exit code is 1 if a check fails, else 0.
+    The recorded scenario's own checks are judged too; if there is also a difference, the code is 4.
 
-    With --port the bytes go to a real robot, at their times. What it answers is recorded, and compared with what its
-    twin answers to the same bytes at the same times (--compare answers). A recording made at a port is compared so,
-    too. Nothing that moves a robot is sent without --allow-motion.
+    With --port the bytes go to a real robot, at their times. Its answers are recorded, and compared with its twin's
+    answers to the same bytes at the same times (--compare answers). A recording made at a port is compared in the same
+    way. Nothing that moves a robot is sent without --allow-motion.
 
-    The list shows the host's frames as sent, before the radio, what became of each at the robots (fresh, stale,
-    damaged, lost, ignored), where their failsafe stopped them, and their answers as the PC received them. What is not
-    fresh is listed first; --all lists everything. With --out the run is recorded: `mirotwin report` makes its page.
+    The list shows the host's frames as sent, before the radio, the result of each at the robots (fresh, stale, damaged,
+    lost, ignored), the stops by their failsafe, and their answers as received by the PC. If there are too many, frames
+    that are not fresh have precedence; --all lists everything. With --out the run is recorded: `mirotwin report` makes
+    its page.
     """
     if options.force and options.out is None and not options.desk.port:
         raise click.UsageError("--force needs --out or --port.")
@@ -149,7 +149,7 @@ def _replay_case(job: Job, options: ReplayOptions) -> int:
 
 
 def _report_case(result: Result, line: str, quiet: bool) -> int:
-    """`line`: the command that stands at what failed."""
+    """`line`: the command that opens the debugger at the failure."""
     for text in result.texts:
         (show if result.code == DONE else complain)(text)
     if result.failures and not quiet:
@@ -158,7 +158,7 @@ def _report_case(result: Result, line: str, quiet: bool) -> int:
 
 
 def _loaded(file: str, options: ReplayOptions) -> tuple[Job, list[Image]]:
-    """The job to replay, and the images of --lines-from. Raises BadInput for options that mean nothing there."""
+    """The job to replay, and the images of --lines-from. Raises BadInput for options that do not apply to it."""
     if options.stack_from is not None and options.firmware is None:
         raise click.UsageError("--stack-from needs --firmware; a recorded image has its own.")
     keys = (*options.settings, *as_settings(options.expected))
@@ -177,7 +177,7 @@ def _loaded(file: str, options: ReplayOptions) -> tuple[Job, list[Image]]:
 
 
 def _compare_with_recorded(job: Job, images: Sequence[Image], options: ReplayOptions) -> int:
-    """Replays it; a stream has nothing to be compared with."""
+    """Replays a recording and compares; a stream has nothing to compare with."""
     compare, scenario = options.compare, job.spec.scenario
     rule = replace(compare.rule(scenario.clock), period_ticks=scenario.period_ticks)
     if job.alone:
@@ -244,7 +244,7 @@ def _compare_with_recorded(job: Job, images: Sequence[Image], options: ReplayOpt
 
 
 def _rerun(job: Job, to_tick: int | None, quiet: bool, watch: Callable[[World], object] | None) -> Run:
-    """All of it, or the control periods that begin before `to_tick`; a stream to that tick.
+    """Runs everything, or the control periods that begin before `to_tick`; a stream up to that tick.
 
     Its checks end there, and its world with the control period, so that all frames are listed.
     """
@@ -280,7 +280,7 @@ def _sent_to_port(job: Job, options: ReplayOptions) -> Job:
 
 
 def _compare_with_twin(job: Job, options: ReplayOptions) -> int:
-    """Runs the twin with what was sent at the port, and compares its answers."""
+    """Runs the twin with the bytes sent at the port, and compares the answers."""
     from mirotwin.runs.at_port import beside_twin
 
     compare, rule = options.compare, options.compare.of_answers(job.spec.origin)

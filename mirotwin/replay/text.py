@@ -36,7 +36,7 @@ Names = tuple[str, str]
 
 
 def difference_lines(difference: RunDifference, subject: str) -> Iterator[str]:
-    """Where `subject` differs first, and what was found by repeating both runs; the notes are not in it."""
+    """Lines about the first difference of `subject`, and the results of repeating both runs, without the notes."""
     if not difference.differences:
         return
     yield f"{subject} in control period {difference.period}, {difference.differences[0].line(difference.names)}"
@@ -138,7 +138,9 @@ class Line(NamedTuple):
 
 
 class Fates:
-    """The result at each robot of what hosts `sent`, from the marks of the air up to `to_tick` (None: all)."""
+    """The result of each of the hosts' frames in `sent` at each robot, from the marks of the air up to `to_tick` (None:
+    all).
+    """
 
     def __init__(
         self,
@@ -172,7 +174,7 @@ class Fates:
 
 
 def stop_lines(marks: Sequence[LinkMark], several: bool) -> list[Line]:
-    """Where the failsafe stopped robots; those that it stopped alike in one line."""
+    """Lines about stops by the failsafe; robots stopped in the same way share a line."""
     alike: dict[tuple[int, int, str], list[str]] = {}
     for mark in marks:
         if mark.robot is not None and mark.kind in STOPS:
@@ -194,8 +196,8 @@ def stop_lines(marks: Sequence[LinkMark], several: bool) -> list[Line]:
 def frame_tables(
     job: Job, replayed: Sequence[Period], everything: bool, to_tick: int | None, marks: Sequence[LinkMark]
 ) -> Iterator[Table | str]:
-    """The frames up to `to_tick` (None: all) that were recorded, of a stream those that were sent; `marks`: of the air,
-    which say what became of them, and where the failsafe stopped a robot.
+    """The recorded frames up to `to_tick` (None: all); for a stream the sent frames. `marks`: of the air, with the
+    results of the frames and the stops by the failsafe.
     """
     networks = job.spec.robot_scenario.networks
     sent = transmissions_of(job.recorded or replayed)
@@ -236,14 +238,14 @@ def _before(lines: Sequence[Line], to_tick: int | None) -> list[Line]:
 
 
 def _listed(frames: Sequence[Line]) -> list[Line]:
-    """The first that are not fresh, and as many of the others as there is room for, in the order of time."""
+    """The first frames that are not fresh, and other frames up to the limit, in the order of time."""
     special = [line for line in frames if line.special][:SHOWN]
     usual = [line for line in frames if not line.special][: SHOWN - len(special)]
     return sorted([*special, *usual], key=attrgetter("tick"))
 
 
 def response_table(replayed: Sequence[Period]) -> Table:
-    """How the robots reacted to a stream: there is no recording to compare with."""
+    """The robots' reactions to a stream, for which there is no recording to compare with."""
     names = (
         "robot",
         "accepted",

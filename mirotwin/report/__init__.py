@@ -1,1 +1,1 @@
-"""What a run amounts to, for people: summary, figure, firmware coverage."""
+"""Reports of a run for people: pages, tables, figures, exports."""

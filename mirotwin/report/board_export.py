@@ -26,11 +26,11 @@ from mirotwin.shell.options import plain_parameters
 from mirotwin.verify.cases.case import stream_text
 
 HEAD_BYTES = 1 << 20
-"""Of a file; what it is of stands before all else."""
+"""Bytes at the beginning of a file that show whether it is of a board."""
 
 
 def is_of_board(head: bytes, format: str) -> bool:
-    """True if a recording or a stream file that begins so is of a board."""
+    """True if a recording or a stream file with this beginning is of a board."""
     messages = Messages(BytesIO(head).read, "", ())
     reader = stream.Reader(head.decode("utf-8", "replace").split("\n"))
     with suppress(RecordingError, StreamError):
@@ -39,9 +39,9 @@ def is_of_board(head: bytes, format: str) -> bool:
 
 
 def board_stream(job: Job) -> str:
-    """All that was sent and put, and what it sent, with the whole scenario: `mirotwin replay` does it again.
+    """A stream with everything sent and put, the board's output, and the whole scenario: `mirotwin replay` repeats it.
 
-    Raises BadInput for a run that went on from a saved one.
+    Raises BadInput for a run that continued a saved one.
     """
     spec, scenario = job.spec, job.spec.scenario
     assert isinstance(scenario, BoardScenario)
@@ -57,7 +57,7 @@ def board_stream(job: Job) -> str:
 
 
 def _script(job: Job) -> Sequence[ScriptItem]:
-    """What was sent each way and done, in the order of time; of a stream file, what it says."""
+    """Characters of both directions and actions, in the order of time; for a stream file, its content."""
     done = (action for period in job.recorded for action in period.actions)
     return (
         sorted((*transmissions_of(job.recorded), *done), key=lambda item: item.tick) or job.spec.script or ()
@@ -65,7 +65,10 @@ def _script(job: Job) -> Sequence[ScriptItem]:
 
 
 def board_rows(job: Job, progress: Callable[[int], object]) -> Iterator[Named]:
-    """How all nets and values stood at first, and each change, in the order of time: of a run that is made for it."""
+    """The first level or value of each net and part, then each change, in the order of time.
+
+    The run is made for this.
+    """
     from mirotwin.report.page.board_watch import BoardWatch  # a hot module: not before the engine was chosen
 
     spec = replace(job.spec, until_tick=job.end_tick)

@@ -39,7 +39,7 @@ from mirotwin.verify.cases.artifacts import CASES
 
 
 def export_foxglove(given: Input, form: Form, out: str, quiet: bool) -> int:
-    """Writes what `given` holds with Foxglove's topics to `out`; returns the exit code. Raises BadInput."""
+    """Writes the content of `given` with Foxglove's topics to `out`; returns the exit code. Raises BadInput."""
     if form.name != "recording":
         reason = f"{form.title}, which holds no postures"
         raise BadInput(given.label, "", reason, "give a run.mcap that `mirotwin run` wrote")
@@ -75,7 +75,7 @@ def target_of(out: str, target: str | None) -> str:
 
 
 class Exported:
-    """Hands transmissions on and counts them. What cannot be read ends them; `failure` if anything came before."""
+    """Passes transmissions on and counts them. Unreadable input ends them; `failure` is set if anything came before."""
 
     def __init__(
         self, sent: Iterator[Transmission], network: int | None, given: Input, bar: ProgressBar
@@ -151,10 +151,10 @@ def export(options: ExportOptions) -> int:
         tshark -X lua_script:miro.lua -d rtacser.data,miro -r run.pcapng -V
 
     A stream file is for `mirotwin replay`, for editors and for git; a capture does not hold stop bits, a stream file
-    does. The same input gives the same bytes. Of an input that is cut short, all that could be read is written, and the
-    exit code is 2. A run that was broken off (run.part.mcap) is written as far as it goes, with a note.
+    does. The same input gives the same bytes. Of an input that is cut short, the readable part is written, and the exit
+    code is 2. An interrupted run (run.part.mcap) is written to its end, with a note.
 
-    For Foxglove, all that is in the recording is written again, with the scene, transforms, log and camera frames that
+    For Foxglove, the content of the recording is written again, with the scene, transforms, log and camera frames that
     Foxglove draws; `mirotwin examples foxglove` writes a layout for it:
 
     \b
@@ -167,8 +167,8 @@ def export(options: ExportOptions) -> int:
         mirotwin export run.mcap --out run.csv
         mirotwin export run.mcap --out truth.csv --channel net0/robot0/truth
 
-    The stream file of a board's run holds the board, what was put into its parts, and what it sent. For CSV it is run
-    again: the table `changes` says how all nets and values of parts stood, and each change, with its tick.
+    The stream file of a board's run contains the board, the values put into its parts, and its output. For CSV it is
+    run again: the table `changes` has the first state of all nets and values of parts, and each change, with its tick.
     """
     options = replace(options, file=file_in(options.file, (*RECORDINGS, *CASES)))
     out, network, quiet = options.out, options.network, options.quiet
@@ -225,7 +225,7 @@ def _actions(options: ExportOptions, form: Form) -> list[ScriptItem]:
 
 
 def export_tables(options: ExportOptions, given: Input, form: Form, bar: ProgressBar, of_board: bool) -> int:
-    """Writes CSV, of what could be read; returns the exit code. Raises BadInput."""
+    """Writes the readable part as CSV; returns the exit code. Raises BadInput."""
     recorded, only = form.name == "recording", options.channel
     only = only and only.strip("/")
     if options.out == STDIN and recorded and not only:

@@ -78,14 +78,14 @@ class ReportOptions(Options, frozen=True, kw_only=True):
 def report(options: ReportOptions) -> int:
     """Writes one HTML file that needs no network: look at it in any browser, send it, keep it with a build.
 
-    Of RUN and OTHER-RUN, one page shows both, one over the other, and where they first differ.
+    With RUN and OTHER-RUN, one page shows both, drawn over each other, and their first difference.
 
     RUN is a folder of `mirotwin run`, or a recording (run.mcap, run.part.mcap); CASE a case (FILE.stream) as `test`,
     `fuzz` and `conform` leave it; TEST-FAILURE the folder that a failed test of pytest or `mirotwin test` leaves.
     `mirotwin campaign page` makes the page of a campaign.
 
-    A run is made again for its page, with the recorded bytes: the profile of the firmware, its coverage, the fate of
-    each frame and the verdicts of the checks come from that, and where it differs from the recording is said.
+    The run is repeated for its page with the recorded bytes. The repetition gives the firmware's profile and coverage,
+    the fate of each frame and the verdicts of the checks; differences from the recording are reported.
     """
     subject, other = options.subject, options.other
     if other is not None and (given := options.given("firmware", "sources", "no_frames")):
@@ -129,7 +129,7 @@ def page_of(wanted: ReportOptions, name: str = "") -> bytes:
 
 
 def _side(wanted: ReportOptions, subject: str) -> Side:
-    """One of two runs: as it was recorded, or what a case or a stream file does. Raises BadInput."""
+    """One of two runs: from a recording, or made from a case or a stream file. Raises BadInput."""
     job = load_job(_file_of(subject), capture=wanted.capture)
     file = Path(job.spec.origin)
     if job.alone or job.origin:
@@ -160,13 +160,13 @@ def _ticks_of(wanted: ReportOptions, material: Material) -> tuple[int, int]:
 
 
 def leave_page(folder: Path, name: str = "") -> None:
-    """Writes the page of what the test `name` left in `folder`. Raises BadInput, also where Bokeh is missing."""
+    """Writes the page of the files that the test `name` left in `folder`. Raises BadInput, also without Bokeh."""
     require_bokeh()
     replace_file(folder / PAGE, page_of(ReportOptions(subject=str(folder), quiet=True), name))
 
 
 def _file_of(subject: str) -> str:
-    """The file that is meant: of a folder, the recording or the case in it."""
+    """The file of a subject: for a folder, the recording or the case in it."""
     file = file_in(subject, (*RECORDINGS, *CASES))
     if not Path(file).is_dir():
         return file

@@ -1,4 +1,4 @@
-"""Panels of lines as SVG: axes with round numbers, light or dark as its reader's screen is, the same bytes every time.
+"""Line plots as SVG: axes with round numbers, light or dark like the reader's screen, reproducible bytes.
 
     drawing = Drawing(960, 700, ("A title", "what stands below it"))
     panel = Panel("(b)  x_e", "t [s]", "x_e [cm]", band=3.0)
@@ -6,7 +6,7 @@
     drawing.add(panel, Box(60, 80, 400, 250))
     drawing.write(path)
 
-`_` in a title or a label of an axis sets one letter lower: `x_e`.
+`_` in a title or an axis label makes the next letter a subscript: `x_e`.
 """
 
 from __future__ import annotations
@@ -63,7 +63,7 @@ class Stroke(NamedTuple):
 
 
 class Panel:
-    """Axes and what is drawn in them. `band`: shaded from -band to band. `equal`: a unit is as long up as across."""
+    """Axes with lines. `band`: shaded from -band to band. `equal`: same scale on both axes."""
 
     def __init__(
         self, title: str, x_label: str = "", y_label: str = "", *, band: float = 0.0, equal: bool = False

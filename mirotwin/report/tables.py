@@ -1,7 +1,7 @@
 """A run as tables: one for each channel of a recording, with units in the names of the columns.
 
-A table is named after its channel (`net0/robot0/truth`); the commands of LM629s have one of their own, and so have all
-changes on a board. Every row begins with its tick and its time.
+A table has the name of its channel (`net0/robot0/truth`). There are further tables for the commands of LM629s and for
+all changes on a board. Every row begins with its tick and its time.
 """
 
 from __future__ import annotations
@@ -48,16 +48,16 @@ UNITS: dict[str, tuple[str, int]] = {
     "stale": ("frames", 1),
     "data": ("hex", 1),
 }
-"""Fields of messages without a unit in their name: the unit, and how many of what is recorded are one of it."""
+"""Fields of messages without a unit in their name: unit, and divisor from the recorded value to that unit."""
 
 
 def timed(tick: int, clock: int) -> Row:
-    """How every row begins."""
+    """The first columns of every row."""
     return {"tick": tick, "time_s": f"{tick / clock:.9f}"}
 
 
 def recorded_rows(given: Input, network: int | None) -> Iterator[Named]:
-    """The rows of a recording, of all networks or of one. Raises RecordingError; where a run was broken off is told."""
+    """The rows of a recording, of all networks or of one. Raises RecordingError; reports an interrupted run."""
     messages = Messages(given.read, given.label, KINDS)
     clock = 0
     broken_off = ""

@@ -43,7 +43,7 @@ def _by_part(summary: BoardSummary) -> dict[str, list[str]]:
 
 
 def _shown(value: float | int | bool | str) -> str:
-    """A value for people; of a long text, such as what a memory holds, the beginning."""
+    """A value for people; of a long text, such as a memory's content, the beginning."""
     if isinstance(value, float):
         return f"{value:.6g}"
     if not isinstance(value, str):

@@ -1,4 +1,4 @@
-"""`mirotwin boards`: the built-in boards, and what each part of a board is."""
+"""`mirotwin boards`: the built-in boards, and a description of each part."""
 
 from __future__ import annotations
 
@@ -30,7 +30,7 @@ KINDS = {IN: "input", STRONG: "output", OPEN_DRAIN: "open drain", TWO_WAY: "inpu
 
 
 class PartPage(msgspec.Struct):
-    """What is known of a part. `origin`: of a plug-in, its distribution or file. `text`: the head of its file."""
+    """Facts about a part. `origin`: of a plug-in, its distribution or file. `text`: the head of its file."""
 
     name: str
     origin: str
@@ -44,7 +44,7 @@ class PartPage(msgspec.Struct):
 
 
 class BoardsGroup(ScenariosGroup):
-    """Tells what was meant where a board or a part is named instead of a command."""
+    """Names the right command if the first argument is a board or a part instead of a command."""
 
     def shows(self, name: str) -> bool:
         return name in builtin_boards() or name in PARTS.names() or is_path(name)
@@ -140,7 +140,7 @@ def _print_page(page: PartPage) -> None:
 
 
 def page_of(name: str) -> PartPage:
-    """What is known of a part. Raises PluginError for one that cannot be used."""
+    """Facts about a part. Raises PluginError for an unusable one."""
     struct = PARTS.find(name)
     check_struct(struct)
     text = _text(struct)
@@ -161,14 +161,14 @@ def page_of(name: str) -> PartPage:
 
 
 def _unconnected(pin: Pin) -> str:
-    """What the part finds at a pin that may be left out."""
+    """The level that the part sees at an unconnected optional pin, in words."""
     if not pin.optional:
         return ""
     return "may be left out" if pin.kind == STRONG else f"may be left out: {'high' if pin.level else 'low'}"
 
 
 def _text(struct: type[PartKeys]) -> str:
-    """The head of the part's file, where its pins are drawn; of a file that has none, what its class says."""
+    """The head of the part's file, with a drawing of its pins; if the file has none, the class's docstring."""
     module = sys.modules.get(struct.__module__)
     head = module.__doc__ if module is not None else getattr(struct.make, "__globals__", {}).get("__doc__")
     return cleandoc(head or struct.__doc__ or "a part").rstrip()

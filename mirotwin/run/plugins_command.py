@@ -43,11 +43,11 @@ BY_KIND: dict[str, Registry[Any] | None] = {
 }
 """Kind to its registry; cameras have none: all are our own."""
 _SENTENCE = re.compile(r"(?<=[^A-Z])\.\s")
-"""Its end, not that of an initial."""
+"""The end of a sentence; not the full stop of an initial."""
 
 
 class Key(msgspec.Struct):
-    """A key of a plug-in's table: what it takes, the unit that ends it, and its default, as JSON."""
+    """A key of a plug-in's table: type, unit suffix, and default as JSON."""
 
     key: str
     takes: str
@@ -56,7 +56,7 @@ class Key(msgspec.Struct):
 
 
 class Plugin(msgspec.Struct):
-    """What is known of a plug-in. `main`: the key that a bare value is for. `problem`: why it cannot be used."""
+    """Facts about a plug-in. `main`: the key for a bare value. `problem`: why it cannot be used."""
 
     kind: str
     name: str
@@ -78,10 +78,10 @@ class PluginsOptions(Options, frozen=True, kw_only=True):
 
 @command_of(PluginsOptions)
 def plugins(options: PluginsOptions) -> None:
-    """Lists what is installed of each KIND: laws, estimators, references, cameras, protocols, checks, parts.
+    """Lists the installed plug-ins of each KIND: laws, estimators, references, cameras, protocols, checks, parts.
 
-    With KIND also the keys of each: what it takes, and its default. One with a * is the key that a bare value is for.
-    Where a plug-in comes from is its distribution and its file.
+    With KIND also the keys of each, with type and default. A bare value is for the key with a *. The origin of a
+    plug-in is its distribution and its file.
     """
     options.files.bring()
     chosen = list(dict.fromkeys(options.kinds or BY_KIND))
@@ -145,7 +145,7 @@ def _origin(kind: str, name: str) -> tuple[str, str]:
 
 
 def file_of(struct: type) -> str:
-    """Where its source is, of a compiled module, too; "" if it has none."""
+    """Path of the source, also of a compiled module; "" if there is none."""
     file = getattr(sys.modules.get(struct.__module__), "__file__", None)
     if file is None:
         return ""
@@ -160,7 +160,7 @@ def head_of(struct: type) -> str:
 
 
 def about(struct: type) -> str:
-    """What it is, in one sentence: the head of its file says that, or its class where the file holds several."""
+    """A description in one sentence: from the head of its file, or from its class if the file contains several."""
     module = sys.modules.get(struct.__module__)
     tagged = (
         [member for member in vars(module).values() if _tagged(member, struct)] if module is not None else []
@@ -172,7 +172,7 @@ def about(struct: type) -> str:
 
 
 def _tagged(value: Any, struct: type) -> bool:
-    """True if it is a plug-in that stands in the same file."""
+    """True for another plug-in class of the same file."""
     config = getattr(value, "__struct_config__", None)
     return isinstance(value, type) and value.__module__ == struct.__module__ and bool(config and config.tag)
 
@@ -192,7 +192,7 @@ def keys_of(struct: type[msgspec.Struct], above: str = "", whole: Any = None) ->
 
 
 def takes(kind: kinds.Type, key: str = "") -> str:
-    """What a key takes, in words of the file: `a number in milliseconds, 0 to 100`."""
+    """The type of a key's value in words: `a number in milliseconds, 0 to 100`."""
     if isinstance(kind, kinds.Metadata):
         return takes(kind.type, key)
     if isinstance(kind, kinds.LiteralType):

@@ -47,11 +47,12 @@ def run(options: RunOptions) -> int:
     """Runs SCENARIO (a built-in name, or a .toml file) and writes run.mcap, figure.svg and summary.json.
 
     SCENARIO may be a board, too: the scenario of a board (`board = "car.board.toml"` in it), or a board file with
-    --firmware and --for. What its parts measure and show is in the recording, and at the end in the table.
+    --firmware and --for. The values that its parts measure and show are in the recording; the last ones are in the
+    table.
 
-    A run that is broken off (Ctrl-C, a full disk, an error) leaves run.part.mcap and summary.part.json instead, with
-    all that was recorded; one that is killed leaves run.part.mcap with all but the last half second. decode, export
-    and replay read it. Files of an earlier run stay as they are until the new ones are complete.
+    An interrupted run (Ctrl-C, a full disk, an error) leaves run.part.mcap and summary.part.json instead, with
+    everything recorded so far; a killed run leaves run.part.mcap without the last half second. decode, export and
+    replay read it. Files of an earlier run stay unchanged until the new ones are complete.
 
     A file of three lines is another scenario with single keys changed:
 
@@ -60,13 +61,12 @@ def run(options: RunOptions) -> int:
         name = "mine"
         set = { network.robot.controller.q1_per_s = 0.3 }
 
-    The steps of a scenario (`[[step]]`) are done, as by `mirotwin test`.
+    The steps of a scenario (`[[step]]`) are executed, as by `mirotwin test`.
 
-    A run that is resumed has the bits of one that never stopped. Its recording begins with the first whole control
-    period, and holds the saved world. Its errors and checks cover the time from there.
+    A resumed run has the same bits as an uninterrupted one. Its recording begins with the first whole control period,
+    and contains the saved world. Its errors and checks cover the time from there.
 
-    Exit code 1: a step, or a check of --expect or of the scenario's [expect] failed; 3: the firmware did what it must
-    not.
+    Exit code 1: a step, or a check of --expect or of the scenario's [expect] failed; 3: a firmware fault.
     """
     seed, record = options.seed, options.record
     options.plugins.bring()
@@ -150,7 +150,7 @@ def run(options: RunOptions) -> int:
 
 
 def _report(run: Run, result: Result, summary: AnySummary, options: RunOptions) -> None:
-    """One case: the run."""
+    """Writes the results file with one case: the run."""
     if run.trace is not None:  # a run that was resumed is not known from its beginning
         result = located(run, result)
     again = replace(options, out=None, force=False, as_json=False, junit=None, no_figure=False, quiet=False)
@@ -187,8 +187,9 @@ def _table(summary: AnySummary, run_files: RunFiles, folder: Path) -> Table:
 
 @contextmanager
 def reported(run_files: RunFiles) -> Iterator[None]:
-    """Around all that writes files: where that breaks off, tells what is left, and the verdict if there is one (a full
-    disk).
+    """Context for code that writes files.
+
+    If it is interrupted, reports the remaining files, and the verdict if there is one (a full disk).
     """
     try:
         yield

@@ -1,11 +1,11 @@
-"""The files of a run while it is under way: what is written when, and what is left of a run that is broken off.
+"""Writes the files of a run while it is under way, and the partial files of an interrupted run.
 
-Signals are held except while the world is stepped, so no file is left between two states. What was recorded is flushed
-several times a second; a process that is killed loses no more.
+Signals are held except while the world is stepped, so no file is left between two states. The recording is flushed
+several times a second, so a killed process loses at most that much.
 
-`--save-at .. --resume .. --to ..` say where a run begins, what it saves, and where it ends. A world that goes on from a
-saved one has the bits of a run that never stopped. A run that is resumed within a control period goes on to that
-period's end first: only whole periods are recorded.
+`--save-at .. --resume .. --to ..` set the begin of a run, the ticks to save, and its end. A world that continues a
+saved one has the same bits as an uninterrupted run. A run resumed within a control period first runs to the end of that
+period, because only whole periods are recorded.
 """
 
 from __future__ import annotations
@@ -49,9 +49,9 @@ WORLD_SUFFIX = ".world"
 
 
 class Stops:
-    """Where a run of `world` stops: it saves into `folder` at each tick of `save_at`, and ends at `to_tick`.
+    """Stops of a run of `world`: it is saved into `folder` at each tick of `save_at`, and ends at `to_tick`.
 
-    Raises BadInput for ticks that the run does not come past.
+    Raises BadInput for ticks that the run does not reach.
     """
 
     def __init__(
@@ -73,7 +73,7 @@ class Stops:
         return [f"at-{tick}{WORLD_SUFFIX}" for tick in self.save_ticks]
 
     def begin(self, world: World) -> None:
-        """Puts `world` to where the saved one is, and to the end of its control period."""
+        """Loads the saved world into `world`, and runs to the end of its control period."""
         if self.resume is not None:
             saved = read_input(self.resume, WORLD_BYTES)
             try:
@@ -118,8 +118,9 @@ class Stops:
 class RunFiles:
     """Does `run` and fills `folder`, which is open meanwhile.
 
-    The recording gets each frame of `views`. `move` drives the world, None: its run does; `live` tells how it went.
-    `stops`: where the world is saved, and ends. `broken_off`: what is left of a run that was, "" before.
+    The recording gets each frame of `views`. `move` drives the world (None: its run does); `live` returns the figures
+    of a session. `stops`: ticks to save at, and the end. `broken_off`: message about the partial files of an
+    interrupted run, else "".
     """
 
     folder: OutputFolder
@@ -136,7 +137,7 @@ class RunFiles:
     _wall_s: float = field(default=0.0, init=False)
 
     def fill(self, bar: ProgressBar, hold: Hold, title: str | None) -> AnySummary:
-        """The whole run; returns its summary. Whatever it raises, parts of the recording and the summary are left.
+        """Runs everything and returns the summary. On any exception, parts of the recording and the summary are left.
 
         `hold` holds signals. `title` None: no figure.
         """
@@ -199,9 +200,9 @@ class RunFiles:
         return StepResults(player.done, len(player.steps), failed, tuple(verdicts))
 
     def _leave_parts(self, reason: str) -> None:
-        """What is left when the run is broken off: nothing, if not even one control period was recorded.
+        """Writes the partial files of an interrupted run; none if not even one control period was recorded.
 
-        `reason`: which part failed, if one did.
+        `reason`: the failed part of the scenario, if there is one.
         """
         if not self.tracks.count:
             return
@@ -219,7 +220,7 @@ def _keep_frame(recorder: Recorder, view: View) -> None:
 
 
 class _Digest(msgspec.Struct):
-    """What any summary has."""
+    """The fields that every summary has."""
 
     digest: str
 

@@ -49,7 +49,10 @@ def table_of(summary: Summary, tracks: Tracks, folder: Path, polar: bool) -> Tab
 
 
 def begun_table(summary: AnySummary, covered: str, *more: tuple[str, str]) -> Table:
-    """The first rows, of robots and of boards. `covered`: what of a resumed run the figures cover. `more`: a board."""
+    """The first rows, for robots and boards. `covered`: the part of a resumed run that the figures cover.
+
+    `more`: rows of a board.
+    """
     table = facts_table()
     table.add_row("scenario", f"{summary.scenario}, seed {summary.seed}")
     for row in more:

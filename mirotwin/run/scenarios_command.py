@@ -17,7 +17,7 @@ from mirotwin.shell.program import LazyGroup
 
 
 class ScenariosGroup(LazyGroup):
-    """Tells what was meant where a scenario is named instead of a command."""
+    """Names the right command if the first argument is a scenario instead of a command."""
 
     def shows(self, name: str) -> bool:
         """True if `show` takes this name."""
@@ -67,7 +67,7 @@ class ScenarioOptions(Options, frozen=True, kw_only=True):
 
 @command_of(ScenarioOptions)
 def show(options: ScenarioOptions) -> None:
-    """Prints the file of the built-in scenario NAME, to read or to start one's own from. NAME may be a file, too.
+    """Prints the file of the built-in scenario NAME, to read or to copy as a start for yours. NAME may be a file, too.
 
     A file of three lines is that scenario with single keys changed:
 
@@ -97,7 +97,7 @@ def profiles() -> None:
 def variants() -> None:
     """Lists the variants, for `--set variant=..` or `variant = ".."` in a file, and the keys that each sets.
 
-    With --set a variant wins over the file, and over what is set before it; in a file, keys that are given win.
+    With --set a variant overrides the file and settings before it; in a file, keys that are given override the variant.
     """
     table = plain_table("variant", "what it is", "keys", bold=True)
     for name, variant in scenario_profiles.tables_of("variant").items():

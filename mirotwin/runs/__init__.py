@@ -1,1 +1,1 @@
-"""One run: what is to be run (`spec`), the run under way (`run`), what came of it (`result`)."""
+"""One run: its specification (`spec`), the running world (`run`), and its result (`result`)."""

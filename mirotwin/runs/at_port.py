@@ -1,4 +1,4 @@
-"""Runs at a port: what is sent to robots and what they answer, recorded, and held beside what their twin answers."""
+"""Runs at a port: frames sent to robots and their answers are recorded, and compared with their twin's answers."""
 
 from __future__ import annotations
 
@@ -42,7 +42,7 @@ _TWIN = (
 
 
 def twin_source(scenario: Scenario, seed: int, image: Image) -> RunSource:
-    """What the twin of robots at a port is made from."""
+    """The sources of the twin of robots at a port."""
     twin = changed(scenario, scenario.name, [*live_settings(scenario), *_TWIN]).scenario
     return RunSource(
         scenario_name=twin.name,
@@ -56,7 +56,7 @@ def twin_source(scenario: Scenario, seed: int, image: Image) -> RunSource:
 
 
 def sendable(job: Job, desk: DeskOptions, note: Note) -> list[Transmission]:
-    """All that the job's hosts send. Raises BadInput for what no port can send, or the guard does not allow."""
+    """All transmissions of the job's hosts. Raises BadInput if a port cannot send them, or the guard refuses them."""
     file = job.spec.origin
     sent, guard = sent_in(job.spec.script or ()), Guard(desk, file)
     if not sent:
@@ -115,7 +115,7 @@ def send(
 def beside_twin(
     job: Job, rule: CompareRule = ANSWERS, progress: Callable[[int], object] = lambda tick: None
 ) -> PortComparison:
-    """Runs the twin with what was sent at the port; the recorded answers beside its own."""
+    """Runs the twin with the characters sent at the port; compares the recorded answers with the twin's."""
     again = job.run(len(job.recorded) * CONTROL_PERIOD_TICKS, progress)
     return compare(job.recorded, again.periods, job.spec.robot_scenario.networks[0].robots, rule)
 
@@ -123,11 +123,11 @@ def beside_twin(
 def play_at_port(
     text: ScenarioText, steps: Sequence[Step], image: Image, desk: DeskOptions, folder: Path | None
 ) -> Result:
-    """A scenario file as a test of a robot at a port: the steps that a PC can do and see, one after the other.
+    """Runs a scenario file as a test of a robot at a port: the steps that a PC can execute and observe, in order.
 
-    A step that waits for something inside the robot is passed over. One that switches or disturbs the robot cannot be
-    left out without changing what follows: the test ends there. Neither passes; they are counted as not observable.
-    `folder`: where the recording is left. Raises NotObservable.
+    A step that waits for something inside the robot is skipped. A step that switches or disturbs the robot ends the
+    test, because the following steps depend on it. Neither counts as passed; both are counted as not observable.
+    `folder`: for the recording. Raises NotObservable.
     """
     path, recording, notes, written = text.origin, BytesIO(), list[str](), False
     with port_for_test(desk, text.scenario, path, notes.append) as port:

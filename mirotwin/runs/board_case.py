@@ -1,4 +1,4 @@
-"""A board alone, as the header of a stream file says it: the empty board, its wire, and what is played to it.
+"""A single board in the header of a stream file: the empty board, its wire, and the stream that is played to it.
 
 # mirotwin stream 2
 #: firmware_sha256 = ".."
@@ -39,7 +39,7 @@ from mirotwin.runs.spec import RunSpec
 AHEAD_TICKS = 240
 """The firmware counts as started up so long before the first character at the latest."""
 AFTER_MS = 50
-"""So long after the last character a stream that names no end ends: firmware may answer meanwhile, or do wrong."""
+"""A stream without an end tick ends this long after its last character: the firmware may still answer, or fail."""
 
 
 class BoardHeader(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
@@ -67,7 +67,7 @@ def board_of_stream(given: StreamFile) -> BoardScenario:
 
 
 def end_of_board(script: Sequence[ScriptItem], scenario: BoardScenario) -> int:
-    """Where a stream ends that does not say it."""
+    """Last tick of a stream without an end tick."""
     ends = [item.tick + _duration(item, scenario) for item in script]
     return max(ends, default=scenario.begin_tick) + after_ticks(scenario)
 
@@ -77,14 +77,14 @@ def after_ticks(scenario: BoardScenario) -> int:
 
 
 def is_for_board(header: Header) -> bool:
-    """True if a stream is for a board, and not for robots."""
+    """True if a stream is for a board, False for robots."""
     return not (header.bare is None and header.board is None) or (
         isinstance(header.scenario, dict) and BOARD in header.scenario
     )
 
 
 def tables_of_stream(given: StreamFile, script: Sequence[ScriptItem]) -> dict[str, Any]:
-    """The tables of the scenario of a stream for a board; it lasts as long as the stream, if the header says no more.
+    """The tables of the scenario of a stream for a board; without a duration in the header it has that of the stream.
 
     Raises BadInput.
     """
@@ -102,7 +102,7 @@ def tables_of_stream(given: StreamFile, script: Sequence[ScriptItem]) -> dict[st
 
 
 def check_crystal(scenario: BoardScenario, crystal_hz: int, path: str) -> None:
-    """Raises BadInput for a board with another crystal than the one whose ticks the file counts."""
+    """Raises BadInput if the board's crystal is not the one whose ticks the file counts."""
     if scenario.clock != crystal_hz:
         reason = (
             f"its ticks are of a crystal of {crystal_hz} Hz, and the board has one of {scenario.clock} Hz"
@@ -111,7 +111,7 @@ def check_crystal(scenario: BoardScenario, crystal_hz: int, path: str) -> None:
 
 
 def check_board_script(script: Sequence[ScriptItem], path: str, scenario: BoardScenario) -> None:
-    """Raises BadInput for characters that overlap, and for what is done to other devices."""
+    """Raises BadInput for characters that overlap, and for actions on other devices."""
     free_tick = 0
     for item in script:
         if item.network or getattr(item, "slot", 0):

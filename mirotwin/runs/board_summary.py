@@ -1,4 +1,4 @@
-"""What a run of a board amounts to, as numbers: its `summary.json`, and what the table on the screen says."""
+"""The figures of a board's run: its `summary.json`, and the table on the screen."""
 
 from __future__ import annotations
 
@@ -45,7 +45,7 @@ class SerialFigures(msgspec.Struct, frozen=True, omit_defaults=True):
 
 
 class BoardSummary(msgspec.Struct, frozen=True, omit_defaults=True):
-    """`summary.json` of a run of a board; what has the same name there means the same as in `Summary`.
+    """`summary.json` of a board's run; fields with the same name mean the same as in `Summary`.
 
     `parts`: the values of the parts at the end of the run, by PART.KEY.
     """
@@ -76,7 +76,9 @@ AnySummary = Summary | BoardSummary
 
 
 def _other_baud(world: World) -> int:
-    """The receiver's rate where it is more than 4 % from the board's: a real terminal of that rate reads nothing."""
+    """The receiver's baud rate if it is more than 4 % from the board's, so that a real terminal would read garbage;
+    else 0.
+    """
     wanted, bit_ticks = world.scenario.board.baud, world.devices[0].board.cpu.peripherals.bit_ticks()
     if not wanted or not bit_ticks:
         return 0
@@ -85,7 +87,7 @@ def _other_baud(world: World) -> int:
 
 
 def summarise_board(world: World, serial: SerialCounts, wall_s: float, begin_tick: int = 0) -> BoardSummary:
-    """The summary of a run of `world` from `begin_tick`, without what only some runs have."""
+    """The summary of a run of `world` from `begin_tick`, without the optional fields."""
     scenario, clock = world.scenario, world.clock
     counters: Mapping[str, Mapping[str, Any]] = world.counters()
     values = (

@@ -1,4 +1,4 @@
-"""Where in the C sources a run failed: the line at which `mirotwin debug` stands."""
+"""The place of a failure in the C sources: the line at which `mirotwin debug` opens."""
 
 from __future__ import annotations
 
@@ -31,9 +31,9 @@ def located_in(spec: RunSpec, result: Result) -> Result:
 
 
 def place_at(spec: RunSpec, tick: int, place: tuple[int, int] | None = None) -> Place | None:
-    """The line where the device in `place`, (network, slot), stands at the first instruction from `tick` on.
+    """The line of the device in `place` (network, slot) at its first instruction from `tick` on.
 
-    None where no debug file knows it, and where a part of the run breaks.
+    None if no debug file contains it, or if a part of the run fails.
     """
     with suppress(BadInput, DomainError, PluginError):
         return _place_at(spec, tick, place)

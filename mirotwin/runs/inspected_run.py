@@ -17,11 +17,9 @@ PIECE_TICKS = CONTROL_PERIOD_TICKS
 
 
 class InspectedRun:
-    """The device in place `index` of line `network` of a world, which runs as a whole.
-
-    `board`: the robot's around its CPU, None of a board alone. `end_tick`: tick at which the run is over (default: the
-    end of the scenario; None, if that has none). `tick_hz`: the crystal, one tick a period. `job`: what it repeats, if
-    anything.
+    """Device `index` of line `network` of a world, which runs as a whole. `board`: the robot's board around its CPU,
+    None for a single board. `end_tick`: end of the run (default: of the scenario; None if it has none). `tick_hz`:
+    frequency of the crystal, one tick per period. `job`: the job that it repeats, if any.
     """
 
     def __init__(
@@ -49,13 +47,15 @@ class InspectedRun:
         return self.world.finished or (self.end_tick is not None and self.world.tick >= self.end_tick)
 
     def tell_pins(self, report: Callable[[int, int, int], object]) -> None:
-        """`report(tick, port, levels)` gets what a file puts on the pins of a board alone; nothing else moves them."""
+        """`report(tick, port, levels)` is called with the levels that a file puts on the pins of a single board;
+        nothing else moves them.
+        """
         line = self.world.lines[self.network]
         if isinstance(line, Wire) and line.terminal is not None:
             line.terminal.pins.told = report
 
     def to(self, tick: int) -> None:
-        """Moves on to `tick`, or to the end of the run."""
+        """Runs to `tick`, or to the end of the run."""
         if not self.over:
             self.world.run_to(tick if self.end_tick is None else min(tick, self.end_tick))
 
@@ -69,7 +69,7 @@ def watch(
 ) -> bool:
     """Runs to `end_tick` (None: to the end) with `watchers` attached from `first_tick` on.
 
-    Returns whether the run reached `first_tick`. Up to there no watcher is attached, so it runs at full speed.
+    Returns True if the run reached `first_tick`. Before that no watcher is attached, so it runs at full speed.
     """
     _move(run, first_tick, progress)
     if run.over:

@@ -1,4 +1,4 @@
-"""What a file asks to be sent again: a recording with all that it was made from, or a text stream."""
+"""Loads a file whose content is sent again: a recording with its sources, or a text stream."""
 
 from __future__ import annotations
 
@@ -68,7 +68,7 @@ LONGEST_TICKS = 86_400 * TICKS_PER_SECOND
 
 
 def script_of(periods: Iterable[Period]) -> list[ScriptItem]:
-    """Everything the hosts of a recording sent, and what was done to robots and radios."""
+    """Everything that the hosts of a recording sent, and the actions on robots and radios."""
     items: list[ScriptItem] = []
     for period in periods:
         items += [*period.wire, *period.actions]
@@ -81,14 +81,13 @@ def script_of_stream(lines: Iterable[ScriptItem]) -> list[ScriptItem]:
 
 
 def sent_in(script: Iterable[ScriptItem]) -> list[Transmission]:
-    """Only what hosts send."""
+    """The hosts' transmissions only."""
     return [item for item in script if isinstance(item, Transmission) and item.direction == DOWN]
 
 
 def check_script(script: Sequence[ScriptItem], scenario: Scenario | None = None) -> None:
-    """Raises BadInput for transmissions of a network that overlap, and for a network or robot that is not there.
-
-    Without a scenario any robot of as many networks as there can be.
+    """Raises BadInput for overlapping transmissions in a network, and for a network or robot that does not exist.
+    Without a scenario all possible robots and networks are allowed.
     """
     networks = MAX_NETWORKS if scenario is None else len(scenario.networks)
     before: dict[int, Transmission] = {}
@@ -120,10 +119,10 @@ def robots_of_stream(sent: Iterable[ScriptItem]) -> int:
 
 
 def scenario_of_stream(sent: Sequence[ScriptItem], header: Header | None = None) -> Scenario:
-    """The scenario that the header names or holds; without one the default scenario with an ideal link.
+    """The scenario that the header names or contains; without one the default scenario with an ideal link.
 
-    Raises BadInput for a stream with nothing to send, for transmissions that overlap, that take more than a
-    day, or that have no place in the scenario of the header; ScenarioError for that scenario.
+    Raises BadInput for a stream without transmissions, for overlapping ones, for more than a day, and for ones outside
+    of the header's scenario; ScenarioError for an error in that scenario.
     """
     script = script_of_stream(sent)
     if header is None or header.scenario is None:
@@ -189,7 +188,7 @@ def _default_scenario(script: Sequence[ScriptItem]) -> Scenario:
 
 
 def image_of(recording: Recording, path: str | Path) -> Image:
-    """The image in the recording, with the symbols it had when it was recorded. Raises BadInput for what is not one."""
+    """The image in the recording, with the symbols saved with it. Raises BadInput for an invalid image."""
     source = recording.source
     image = parse_hex(source.firmware, Path(path) / "firmware.ihx")
     symbols = Symbols({name: Symbol(address, space) for name, (address, space) in source.symbols.items()})
@@ -197,8 +196,9 @@ def image_of(recording: Recording, path: str | Path) -> Image:
 
 
 class Case(msgspec.Struct, frozen=True):
-    """What a case says of itself: the check's line, and where that run ended (0: with its scenario). `changed`: it is
-    to run with other firmware or other settings.
+    """The verdict in a case: the check's line, and the tick at which its run ended (0: the end of its scenario).
+
+    `changed`: it will run with other firmware or settings.
     """
 
     verdict: str = ""
@@ -207,13 +207,13 @@ class Case(msgspec.Struct, frozen=True):
 
 
 class Job(msgspec.Struct, frozen=True, kw_only=True):
-    """What is to be replayed: a recording, or a text stream (then `recorded` is empty and `image` None).
+    """A file to replay: a recording, or a text stream (then `recorded` is empty and `image` None).
 
-    `spec`: the run, on the image to play it to. `image`: the one that was recorded, None where it is none. `state`: the
-    form of the states whose digests were recorded, if a replay computes the same states, else empty: a controller's
-    states are not computed again. `source`: what the recording was made from. `notes`: what there is to know of the
-    file, a line each. `captured_as`: the form of a capture by another tool, else empty. `as_recorded`: a recording's
-    run without other settings, seed or firmware.
+    `spec`: the run, with the image to use. `image`: the recorded one, None if it is no valid image. `state`: the form
+    of the states whose digests were recorded, if a replay computes the same states, else empty: a controller's states
+    are not computed again. `source`: the sources of the recording. `notes`: remarks on the file, a line each.
+    `captured_as`: the form of a capture by another tool, else empty. `as_recorded`: a recording's run without other
+    settings, seed or firmware.
     """
 
     spec: RunSpec
@@ -233,7 +233,7 @@ class Job(msgspec.Struct, frozen=True, kw_only=True):
 
     @property
     def end_tick(self) -> int:
-        """Where it is over: with what was recorded, where a case failed, or with its scenario."""
+        """End of the replay: of the recording, of the case's failure, or of the scenario."""
         scenario = self.spec.scenario
         if not self.recorded:
             return self.case.end_tick or scenario.end_tick
@@ -254,7 +254,7 @@ class Job(msgspec.Struct, frozen=True, kw_only=True):
             )
 
     def result_of_case(self, run: Run) -> Result:
-        """What the checks that it names say this time, or all where it has no verdict."""
+        """The verdict of the case's checks in this run; of all checks if the case has no verdict."""
         checks, result = run.checks, run.result()
         named = [each.verdict for each in checks.verdicts() if each.name in checks.named]
         verdict = judge(named) if self.case.verdict else checks.verdict()
@@ -263,7 +263,7 @@ class Job(msgspec.Struct, frozen=True, kw_only=True):
         return replace(result, verdict=outcome.verdict, said=outcome.said, failures=outcome.failures)
 
     def judge_case(self, progress: Callable[[int], object] = lambda tick: None) -> Result:
-        """Runs a case, or a stream that expects nothing, to its verdict. Raises BadInput."""
+        """Runs a case, or a stream without expectations, to its verdict. Raises BadInput."""
         if self.case.verdict:
             self.check_case()
         return self.result_of_case(self.run(self.case.end_tick or None, progress))
@@ -275,8 +275,8 @@ class Job(msgspec.Struct, frozen=True, kw_only=True):
         cut: bool = False,
         watch: Callable[[World], object] = lambda world: None,
     ) -> Run:
-        """Sends it again to `until_tick` (None: to its end). `cut`: as of RunSpec. `watch` gets the world before it
-        moves. Raises BadInput.
+        """Replays up to `until_tick` (None: the end). `cut`: as in RunSpec. `watch` gets the world before it runs.
+        Raises BadInput.
         """
         spec = replace(self.spec, until_tick=until_tick, cut=cut)
         with plain_parameters(spec.origin, "replayed"):
@@ -296,8 +296,8 @@ def load_job(
 ) -> Job:
     """Reads `file` and loads the requested image, the recorded one, or the robot's own.
 
-    `settings`: keys to set in the recorded scenario, or in the default one. `seed`: instead of its own.
-    `stack_from`: where the stack of `firmware` begins. `capture`: how a capture of another tool is read.
+    `settings`: keys to set in the recorded scenario, or in the default one. `seed`: replaces the recorded one.
+    `stack_from`: first address of the stack of `firmware`. `capture`: options for a capture of another tool.
     """
     check_no_folder(file, RECORDING)
     data = read_input(file, prefix=MAGIC, prefix_limit=RECORDING_BYTES)
@@ -333,7 +333,10 @@ def _image_for(given: stream.StreamFile, firmware: str | Path | None, stack_from
 
 
 def recorded_spec(recording: Recording, path: str, image: Image | None = None) -> RunSpec:
-    """Sends again what the recorded hosts sent, on `image` (None: the recorded one). Raises BadInput."""
+    """The run that sends the recorded hosts' transmissions again, on `image` (None: the recorded one).
+
+    Raises BadInput.
+    """
     source = recording.source
     _check_brought(source.plugins, path)
     with BadInput.at(f"{path}: {SCENARIO_ATTACHMENT}"):
@@ -362,9 +365,9 @@ def _check_brought(recorded: Iterable[str], path: str) -> None:
 
 
 def _with_bits(scenario: Scenario | BoardScenario, source: RunSource) -> Scenario | BoardScenario:
-    """The scenario of a board with the length of the bits that its host sent, which is known once it sends.
+    """The scenario of a board with the bit length of its host, which is known after the host's first character.
 
-    A saved world has its own, and goes on in the scenario that it was saved in.
+    A saved world contains its own, and continues in the scenario that it was saved in.
     """
     if isinstance(scenario, BoardScenario) and source.bit_ticks and not source.resumed:
         return replace(scenario, bit_ticks=source.bit_ticks)
@@ -372,7 +375,9 @@ def _with_bits(scenario: Scenario | BoardScenario, source: RunSource) -> Scenari
 
 
 def recording_notes(recording: Recording, path: str) -> list[str]:
-    """Where it was broken off, and which plug-ins that its run used are other ones here, a line each."""
+    """Notes on an interrupted recording, and on plug-ins of its run that differ from the installed ones, a
+    line each.
+    """
     notes = [
         f"{path}: {one_line(shortened(text))}: run again, it may do something else"
         for text in plugin_differences(recording.source.plugins)
@@ -390,7 +395,7 @@ def load_stream(file: str, firmware: str | None) -> Job:
 
 
 def _stream(data: bytes, path: str, capture: CaptureOptions) -> tuple[stream.StreamFile, list[str], str]:
-    """The stream file with this content, or one of the characters in a capture; notes, and what the capture is ("": a
+    """The stream file with this content, or made from a capture's characters; notes, and the form of the capture ("": a
     stream file). Raises BadInput.
     """
     if path.endswith(".toml") and detect(data[:HEAD_BYTES]).form != "stream":
@@ -481,7 +486,7 @@ def name_of(path: str) -> str:
 
 
 def _job_of_spec(spec: RunSpec, header: Header, seed: int | None, as_written: AnyText) -> Job:
-    """With the seed, and whether it is run otherwise than the file says."""
+    """The job with the seed; `changed` is set if it is not run as the file says."""
     own = header.seed or 0
     other = header.firmware_sha256 not in (None, spec.image.sha256) or seed not in (None, own)
     other = other or spec.scenario != as_written.scenario

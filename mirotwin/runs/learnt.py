@@ -1,4 +1,4 @@
-"""What the hosts of a run learnt about their cameras and the wheels of their robots, beside the truth."""
+"""The cameras' and wheels' parameters learnt by a run's hosts, beside the true ones."""
 
 from __future__ import annotations
 
@@ -24,7 +24,7 @@ class Learnt(msgspec.Struct, frozen=True):
 class LearntCalibration(msgspec.Struct, frozen=True):
     """One host's camera. `worst_*_cm`: the largest position error that the calibration makes over the pitch.
 
-    `marks`: lines and walls that were used; `refused`: those too far from where they were expected.
+    `marks`: number of lines and walls used; `refused`: those too far from the expected place.
     """
 
     network: int
@@ -61,7 +61,7 @@ def _learnt(network: int, true: Any, learning: Any) -> LearntCalibration:
 
 
 def calibration_text(learnt: LearntCalibration) -> str:
-    """One line for people."""
+    """A line of text for people."""
     return (
         f"net{learnt.network}: {learnt.worst_told_cm:.2f} cm wrong at worst,"
         f" {learnt.worst_learnt_cm:.2f} cm at the end, after {learnt.marks} lines and walls"
@@ -73,7 +73,7 @@ LEFT, RIGHT = "left_factor", "right_factor"
 
 
 class WheelFactor(msgspec.Struct, frozen=True):
-    """A wheel's radius over the nominal one: as it is, and as the estimator has it at the end."""
+    """A wheel's radius divided by the nominal one: the true value, and the estimator's at the end."""
 
     true: float
     learnt: float
@@ -89,7 +89,7 @@ class LearntWheels(msgspec.Struct, frozen=True):
 
 
 def learnt_wheels(networks: Sequence[Any]) -> tuple[LearntWheels, ...]:
-    """Of each robot whose estimator learns them. `networks`: those of a world."""
+    """The learnt wheels of each robot whose estimator learns them. `networks`: those of a world."""
     learnt = []
     for network in networks:
         for robot in network.robots:
@@ -103,7 +103,7 @@ def learnt_wheels(networks: Sequence[Any]) -> tuple[LearntWheels, ...]:
 
 
 def wheels_text(learnt: LearntWheels) -> str:
-    """One line for people."""
+    """A line of text for people."""
     sides = ", ".join(
         f"{name} {100.0 * (factor.true - 1.0):+.2f} % (learnt {100.0 * (factor.learnt - 1.0):+.2f} %)"
         for name, factor in (("left", learnt.left), ("right", learnt.right))

@@ -1,4 +1,4 @@
-"""What two runs were made from, and where that is not the same."""
+"""The sources of two runs, and their differences."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""What came of a run: its verdict, and the lines that say why, the same for every command."""
+"""The result of a run: its verdict, and lines with the reasons, the same for every command."""
 
 from __future__ import annotations
 
@@ -62,12 +62,12 @@ class Result(msgspec.Struct, frozen=True, kw_only=True):
 
     @property
     def failed_tick(self) -> int:
-        """Where it failed first; -1 if nothing did that has a time."""
+        """Tick of the first failure; -1 if no failure has a time."""
         ticks = [self.step_tick] * (self.step_tick >= 0) + [failure.tick for failure in self.failures]
         return ticks[0] if ticks else -1
 
     def facts(self) -> dict[str, str | int | float]:
-        """What names the run, and when and where it failed."""
+        """Facts about the run, and time and place of its failure."""
         facts: dict[str, str | int | float] = {
             "seed": self.seed,
             "digest": self.digest,
@@ -88,13 +88,13 @@ class Result(msgspec.Struct, frozen=True, kw_only=True):
 
     @property
     def lines(self) -> tuple[str, ...]:
-        """What is wrong: firmware faults first."""
+        """Lines about failures, firmware faults first."""
         wrong = [line for line in self.said if VERDICTS[line[0]].junit in ("failure", "error")]
         return tuple(text for _, text in sorted(wrong, key=lambda line: line[0] != "fault"))
 
     @property
     def notes(self) -> tuple[str, ...]:
-        """What else there is to say."""
+        """Further remarks."""
         wrong = self.lines
         return tuple(text for text in self.texts if text not in wrong)
 
@@ -102,7 +102,7 @@ class Result(msgspec.Struct, frozen=True, kw_only=True):
 def failure_facts(
     tick: int, clock: int = TICKS_PER_SECOND, place: Place | None = None, commands: Sequence[str] = ()
 ) -> dict[str, str | int | float]:
-    """When and where something failed, and the two commands of `case_lines`, as far as they are known."""
+    """Time and place of a failure, and the two commands of `case_lines`, as far as they are known."""
     facts: dict[str, str | int | float] = {}
     if tick >= 0:
         facts |= {"tick": tick, "at_ms": round(1000 * tick / clock, 3)}
@@ -126,7 +126,7 @@ def expectation_lines(checks: Checks) -> Iterator[Line]:
 
 
 def fault_lines(devices: Sequence[Device], to_tick: int = NEVER_TICK) -> Iterator[Line]:
-    """What the firmware did wrong up to `to_tick`, a line for each robot, or for a board alone."""
+    """Firmware faults up to `to_tick`, a line for each robot or for a single board."""
     for device in devices:
         faults = [fault for fault in device.board.faults if fault.tick <= to_tick]
         if faults:
@@ -138,8 +138,9 @@ def fault_lines(devices: Sequence[Device], to_tick: int = NEVER_TICK) -> Iterato
 
 
 def expectations_text(expectations: Sequence[Expectation]) -> str:
-    """How many checks passed, and the names of those that did not, for people. One that is always on and had no
-    occasion is not counted.
+    """The number of checks that passed, and the names of the others, for people.
+
+    An always-on check that never applied is not counted.
     """
     counted = [each for each in expectations if each.verdict != "not judged" or each.name not in ALWAYS_ON]
     others = [f"{each.name} {each.verdict}" for each in counted if each.verdict != "passed"]

@@ -1,8 +1,8 @@
-"""A run under way: its world, and all that watches and drives it.
+"""A running world with its checks, watchers and driver.
 
 run = Run(spec)
-run.drive()                  by its steps, or control period by control period; `play` for what is sent again
-run.result()                 its verdict and what there is to say
+run.drive()                  by its steps, or control period by control period; `play` replays a script
+run.result()                 its verdict and the reasons
 """
 
 from __future__ import annotations
@@ -50,15 +50,15 @@ ANSWER_LOOK_TICKS = 24_000
 """Between two looks at whether a board has sent its answer."""
 
 on_world: ContextVar[Callable[[World], object] | None] = ContextVar("on_world", default=None)
-"""Called with the world of each run that begins: how the sanitizer comes to the runs of a command."""
+"""Called with the world of each run that begins; the sanitizer watches a command's runs through it."""
 
 
 class Run:
-    """`world`: one of the spec that nobody has moved, or that was moved to where the checks are to begin.
+    """`world`: built from the spec and unmoved, or moved to the tick at which the checks begin.
 
-    `trace`: what goes into it, None where nobody needs it as a case. `player`: that of its steps. `periods`: those that
-    `play` came past. `proofs`: of the hardware faults, that each changed something. `tick`: where the run ended, -1
-    while it goes on. `is_session`: a live one, which somebody ends.
+    `trace`: records its input, None if no case is needed. `player`: of its steps. `periods`: the control periods that
+    `play` completed. `proofs`: that each hardware fault changed something. `tick`: end of the run, -1 before.
+    `is_session`: a live session, which the user ends.
     """
 
     def __init__(self, spec: RunSpec, world: World | None = None, trace: Trace | None = None) -> None:
@@ -76,7 +76,7 @@ class Run:
 
     @classmethod
     def traced(cls, spec: RunSpec, world: World | None = None) -> Run:
-        """One that can become a case, unless it goes on from a saved world."""
+        """A run that can become a case, unless it continues a saved world."""
         world = spec.world() if world is None else world
         return cls(spec, world, None if world.tick else Trace(world))
 
@@ -89,7 +89,7 @@ class Run:
         on_period: Callable[[Period], object] = lambda period: None,
         move: Callable[[], object] | None = None,
     ) -> None:
-        """To its end: as `move` does it, by its steps, or control period by control period; see `runner.run`."""
+        """Runs to the end: by `move`, by its steps, or control period by control period; see `runner.run`."""
         if move is None and self.player is not None:
             move = self.player.run
         runner.run(self.world, recorder, full, on_period, move)
@@ -124,7 +124,8 @@ class Run:
                 self.drive(recorder, source.record == "full", keep, move)
 
     def play(self, progress: Callable[[int], object] = lambda tick: None) -> Run:
-        """To its end, which may be within a control period; with steps, that of its scenario. `progress` gets the tick.
+        """Runs to its end, which may be within a control period; with steps, to the end of its scenario. `progress`
+        gets the tick.
 
         Raises TransmissionError for a script that cannot be sent.
         """
@@ -149,7 +150,7 @@ class Run:
             progress(world.tick)
 
     def _let_answer(self, sleep: Sleep, progress: Callable[[int], object]) -> None:
-        """A board that has gone to sleep in time goes on until its answer is sent, which belongs to the run."""
+        """Lets a board that has gone to sleep in time continue until its answer, which belongs to the run, is sent."""
         from miro_robot.harness.recording_bus import LONGEST_ANSWER_TICKS  # only boards alone need it loaded
 
         world, last_tick = self.world, self.world.tick + LONGEST_ANSWER_TICKS
@@ -158,7 +159,7 @@ class Run:
             self._go_to(sleep.cpu.cycles * CYCLE_TICKS + ANSWER_LOOK_TICKS, progress)
 
     def finish(self) -> None:
-        """It is over, by itself or because it was broken off."""
+        """Ends the run, completed or interrupted."""
         if self.tick < 0:
             self.tick = self.world.tick
         self.checks.finish()
@@ -234,13 +235,15 @@ class Run:
                 part.write_bytes(content)
 
     def case(self) -> str:
-        """The case of the first failure. Raises ValueError if nothing failed."""
+        """The case of the first failure as text. Raises ValueError if nothing failed."""
         return case_of_checks(self.world, self._known_trace(), self.checks, self._end_tick)
 
     @property
     def _end_tick(self) -> int | None:
-        """Where a case of it ends; None: where the world is. That of a board leaves another build time to come to its
-        fault, but for a session, whose scenario lasts a day.
+        """End tick of its case; None: the present tick.
+
+        For a board it leaves time for a slower build to reach its fault, but not for a session, whose scenario lasts a
+        day.
         """
         if self.is_session or not isinstance(self.world.scenario, BoardScenario):
             return None
@@ -295,7 +298,7 @@ class Run:
         )
 
     def script(self) -> Sequence[ScriptItem]:
-        """What went into it."""
+        """The run's input as a script."""
         return self._known_trace().script()
 
     def _known_trace(self) -> Trace:
@@ -304,7 +307,7 @@ class Run:
 
 
 def scripted(spec: RunSpec, progress: Callable[[int], object] = lambda tick: None) -> RunSpec:
-    """A run with steps, as what they sent and did: it can be stopped anywhere then."""
+    """A run with steps as the script of everything the steps sent and did; such a run can be stopped anywhere."""
     run = Run.traced(spec).play(progress)
     scenario = spec.scenario
     if isinstance(scenario, BoardScenario):
@@ -320,9 +323,9 @@ def robot_spec(
     expect: Mapping[str, Any],
     until_tick: int,
 ) -> RunSpec:
-    """One robot of `robots` that stands hears `script`, over a radio without errors whose carrier is always on.
-
-    `expect`: checks by name with their parameters, as in `[expect]`. It goes on to the end of the control period.
+    """One standing robot of a network of `robots` receives `script`, over a radio without errors whose carrier is
+    always on. `expect`: checks by name with their parameters, as in `[expect]`. The run continues to the end of the
+    control period.
     """
     whole_s = -(-until_tick // TICKS_PER_SECOND)  # whole seconds, so that few texts are read
     settings = (
@@ -341,7 +344,7 @@ def robot_spec(
 
 @contextmanager
 def replaying(file: str, world: World) -> Iterator[None]:
-    """Within it, what cannot be sent or computed is bad input of `file`."""
+    """Converts errors in sending or computing to BadInput for `file`."""
     try:
         with plain_parameters(file, "replayed"):
             yield

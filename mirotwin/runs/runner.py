@@ -41,8 +41,8 @@ def observed(
     recorder: Recorder | None = None,
     on_period: Callable[[Period], object] = lambda period: None,
 ) -> Iterator[None]:
-    """Within it every period goes to `recorder`, and at the end the firmware faults, also when something raises: a
-    recording up to then is worth having.
+    """Passes every period to `recorder`, and at the end the firmware faults; also after an exception, because a
+    recording up to then is useful.
     """
 
     bit_ticks = 0

@@ -1,6 +1,6 @@
-"""What is to be run. The one place that builds a world.
+"""The specification of a run. Only this module builds worlds.
 
-Checks, steps and scenario files are loaded by who has them: `fw run` starts without.
+Checks, steps and scenario files are loaded by the callers that have them, so `fw run` starts without them.
 """
 
 from __future__ import annotations
@@ -26,13 +26,12 @@ if TYPE_CHECKING:
 
 
 class RunSpec(msgspec.Struct, frozen=True, kw_only=True):
-    """A world and how it is driven and judged. `script`: what is sent and done instead of what its hosts do.
+    """A world, its input and its checks. `script`: transmissions and actions that replace its hosts' output.
 
-    `computed`: its hosts compute what they send, and of the script only the actions are done.
-
-    `resumed`: the saved world with which it begins. `expected`: the checks; None: those of the scenario. `steps`: what
-    is done on the way. `until_tick`: where it ends, perhaps beyond its scenario; None: with that. `cut`: it may be
-    ended before it is over. `origin`: the file that messages name.
+    `computed`: the hosts compute their output, and only the actions of the script are executed. `resumed`: the saved
+    world to start from. `expected`: the checks; None: those of the scenario. `steps`: executed during the run.
+    `until_tick`: end, may be after the scenario's; None: the scenario's. `cut`: it may be stopped before its end.
+    `origin`: the file named in messages.
     """
 
     scenario: Scenario | BoardScenario
@@ -53,7 +52,7 @@ class RunSpec(msgspec.Struct, frozen=True, kw_only=True):
         return cls(scenario=text.scenario, image=image, seed=seed, origin=text.origin)
 
     def checks(self) -> Expected:
-        """What is expected of each robot. Raises ScenarioError."""
+        """The checks of each robot. Raises ScenarioError."""
         if self.expected is not None:
             return self.expected
         from mirotwin.verify.checks.expect import expectations_of

@@ -1,4 +1,4 @@
-"""What a run amounts to, as numbers: `summary.json` and the table on the screen."""
+"""The figures of a run: `summary.json` and the table on the screen."""
 
 from __future__ import annotations
 
@@ -22,12 +22,12 @@ if TYPE_CHECKING:
 
 
 class Tracking(msgspec.Struct, frozen=True):
-    """How well a robot followed its reference.
+    """The tracking error of a robot.
 
-    `rms_*`: root mean square over the last second of the run (all of it, if shorter), one value a control
-    period; position is the distance. `settling_s`: the last time at which the robot was outside 3 cm or
-    0.15 rad; 0 if it never was, None if it was so within the last second: it has not settled. `off_pitch_s`: how long
-    a corner of the robot's square was beyond the edge of the pitch, in whole control periods.
+    `rms_*`: root mean square over the last second of the run (all of it, if shorter), one value a control period;
+    position is the distance. `settling_s`: the last time at which the robot was outside 3 cm or 0.15 rad; 0 if it never
+    was; None (not settled) if that time is within the last second. `off_pitch_s`: time in which a corner of the robot's
+    square was beyond the edge of the pitch, in whole control periods.
     """
 
     rms_x_cm: float | None
@@ -39,7 +39,7 @@ class Tracking(msgspec.Struct, frozen=True):
 
 
 class RobotTracking(msgspec.Struct, frozen=True, omit_defaults=True):
-    """The tracking of one robot among several; `theory` is left out where no host steered it."""
+    """The tracking of one robot among several; `theory` is missing if no host steered it."""
 
     network: int
     slot: int
@@ -63,10 +63,10 @@ class LinkCounts(msgspec.Struct, frozen=True):
 
 
 class VisionCounts(msgspec.Struct, frozen=True):
-    """What the cameras of all hosts saw: frames exposed, robots not found in them, frames dropped and repeated.
+    """Counts of all hosts' cameras: frames exposed, robots not found in them, frames dropped and repeated.
 
     `wrong`: measurements further off than three times the worst case of the calibration, `swapped`: nearer to another
-    robot of the team than to their own; both against the truth, which no host knows.
+    robot of the team than to their own; both compared with the true postures, which no host knows.
     """
 
     frames: int
@@ -78,7 +78,7 @@ class VisionCounts(msgspec.Struct, frozen=True):
 
 
 class FirmwareCounts(msgspec.Struct, frozen=True):
-    """The image and what it executed; `machine_cycles` includes `idle_cycles`; all robots added up."""
+    """The image, and cycles executed, summed over all robots; `machine_cycles` includes `idle_cycles`."""
 
     sha256: str
     instructions: int
@@ -125,14 +125,13 @@ class LiveFigures(msgspec.Struct, frozen=True):
 class Summary(msgspec.Struct, frozen=True, omit_defaults=True):
     """`summary.json`. `tracking` and `theory` are the first robot's; `robots` lists all when there are several.
 
-    `wall_s` is the time of the simulation loop, recording included, start-up and figure excluded. `complete` is
-    written only where it is false: the run was broken off, and all figures are of the part before; `reason` says why,
-    if a part of the scenario failed (which one, of which robot, when). `resumed_s` is written only for a run that went
-    on from a saved world: tracking, theory and expectations cover the time from there, counters the time from 0.
-    `set`: the keys of the scenario that were set on the command line (`KEY=VALUE`), only where there were some.
-    `calibrations`: of hosts that learn how their cameras hang, `wheels`: of robots whose estimator learns their wheels.
-    `expectations`: the checks of the run, also those that are always on. `live`: how a live session was paced, and what
-    passed through its ports.
+    `wall_s` is the time of the simulation loop, recording included, start-up and figure excluded. `complete` is written
+    only if it is false: the run was interrupted, and all figures are of the part before; `reason`: the failed part of
+    the scenario, if there is one (its name, robot and time). `resumed_s` is written only for a run that continued a
+    saved world: tracking, theory and expectations cover the time from there, counters the time from 0. `set`: the keys
+    of the scenario that were set on the command line (`KEY=VALUE`), only where there were some. `calibrations`: of
+    hosts that learn their cameras' position, `wheels`: of robots whose estimator learns their wheels. `expectations`:
+    the checks of the run, including the always-on ones. `live`: pace of a live session, and traffic of its ports.
     """
 
     scenario: str
@@ -175,7 +174,7 @@ def tracking_of(samples: Sequence[ErrorSample]) -> Tracking:
 
 
 def rms_name(samples: Sequence[ErrorSample]) -> str:
-    """What `rms_*` of these samples are, for people: with the times, where they cover less than a second."""
+    """Name of `rms_*` of these samples, for people; with the times if they cover less than a second."""
     last = last_second(samples)
     from_tick, to_tick = last[0].tick, last[-1].tick + CONTROL_PERIOD_TICKS
     if to_tick - from_tick >= TICKS_PER_SECOND:
@@ -191,13 +190,13 @@ def _settling_s(samples: Sequence[ErrorSample]) -> float | None:
 
 
 def settling_text(samples: Sequence[ErrorSample]) -> str:
-    """When the robot settled, for people."""
+    """The settling time as text."""
     settling_s = _settling_s(samples)
     return "not settled" if settling_s is None else f"settled at {settling_s:.2f} s"
 
 
 def summarise(world: World, tracks: Tracks, wall_s: float, begin_tick: int = 0) -> Summary:
-    """The summary of a run of `world` from `begin_tick`, without what only some runs have."""
+    """The summary of a run of `world` from `begin_tick`, without the optional fields."""
     gains = gains_of(world.scenario)
     counters: Mapping[str, Mapping[str, Any]] = world.counters()
     everyone = tuple(
@@ -223,7 +222,7 @@ def summarise(world: World, tracks: Tracks, wall_s: float, begin_tick: int = 0) 
 
 
 def off_pitch_text(summary: Summary) -> str:
-    """Which robots left the pitch and for how long, for people; empty if none did."""
+    """The robots that left the pitch and the durations, as text; empty if none did."""
     everyone = summary.robots or (RobotTracking(0, -1, summary.tracking),)
     off = [
         f"{robot.tracking.off_pitch_s:.2f} s"
@@ -235,7 +234,7 @@ def off_pitch_text(summary: Summary) -> str:
 
 
 def vision_text(vision: VisionCounts) -> str:
-    """What the cameras saw, for people: what did not happen is left out, but for lost robots."""
+    """The camera counts as text; zero counts are left out, except lost robots."""
     happened = (
         (vision.dropped, "frame dropped", "frames dropped"),
         (vision.repeated, "frame repeated", "frames repeated"),

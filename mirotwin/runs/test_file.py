@@ -1,4 +1,4 @@
-"""One scenario file run to its verdict: its steps, what it expects, and what every run has to fulfil."""
+"""Runs one scenario file to its verdict: its steps, its expectations, and the checks of every run."""
 
 from __future__ import annotations
 
@@ -49,12 +49,12 @@ def run_test(
     again: Callable[[bool], str] = lambda saves: "",
     desk: DeskOptions | None = None,
 ) -> Result:
-    """Runs a file to its verdict; whatever cannot be run is a result, too.
+    """Runs a file to its verdict; an error is a result, too.
 
-    `firmware`: an image, or its path; default: the one that a board's scenario names, or the robot's own.
-    `artifacts`: below it, in a folder of its own, the file leaves what `save` steps keep and, if it fails, its case; a
-    file that saves needs one. `again`: makes the command that gives the verdict again, from whether the file saves.
-    `desk`: the port of the robots that are tested, if not their twin.
+    `firmware`: an image, or its path; default: the one that a board's scenario names, or the robot's own. `artifacts`:
+    parent of the folder for files of `save` steps and, after a failure, for the case; needed for a file with `save`
+    steps. `again(saves)`: returns the command that repeats the verdict; `saves`: the file has `save` steps. `desk`: the
+    port of the robots that are tested, if not their twin.
     """
     folder = None if artifacts is None else folder_of(artifacts, path)
     if folder is not None:
@@ -138,7 +138,7 @@ def folder_of(artifacts: Path, path: str) -> Path:
 
 
 def stem_of(path: str) -> str:
-    """The name of a file without what its kind is called."""
+    """The name of a file without the suffix of its kind."""
     return Path(path).name.removesuffix(".stream").removesuffix(".toml").removesuffix(".scenario")
 
 

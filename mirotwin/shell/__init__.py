@@ -1,1 +1,1 @@
-"""What all commands share: options, exit codes, the screen, files that are whole or not there."""
+"""Shared code of all commands: options, exit codes, the screen, and files that are written completely or not at all."""

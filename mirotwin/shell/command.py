@@ -1,5 +1,5 @@
-"""A command whose options are one record: the parser, the defaults and the line that gives the command again come from
-its fields.
+"""Commands with their options as one record: parser, defaults and the repeated command line are derived from its
+fields.
 
     class LookOptions(Options, frozen=True, kw_only=True):
         COMMAND = "camera look"
@@ -10,8 +10,8 @@ its fields.
     @command_of(LookOptions)
     def look(options: LookOptions) -> int: ...
 
-A field that is itself such a record stands for all of its options. A flag is a field that is False, an option that may
-be repeated one that is ().
+A field that is itself such a record includes all of its options. A field with the default False is a flag; one with the
+default () is an option that may be repeated.
 """
 
 from __future__ import annotations
@@ -32,7 +32,7 @@ from miro_exact.bad_input import encodable
 
 
 def operand(path: str | PathLike[str]) -> str:
-    """The path as a word of a command: one that begins with a hyphen would be an option."""
+    """The path as a word of a command: one that begins with a hyphen is prefixed, else it would be an option."""
     word = f"{path}"
     return f"./{word}" if word.startswith("-") else word
 
@@ -74,7 +74,7 @@ class Word(click.ParamType):  # type: ignore[type-arg, unused-ignore]
 
 
 class Argument(NamedTuple):
-    """What an argument is on the command line; its field is called as the function wants it."""
+    """The declaration of an argument; the field's name is the function's parameter."""
 
     metavar: str
     type: Any = None
@@ -82,11 +82,11 @@ class Argument(NamedTuple):
 
 
 class Option:
-    """What an option is on the command line. Without names it is called as its field.
+    """The declaration of an option. Without names it has the name of its field.
 
-    `heading`: the group of the help in which it stands. `needs`, `apart`: the field without which, or together with
-    which, it is refused. `alone`: the value of an option that is given without one. An option that several commands
-    have is declared once, and may say something else of itself in each (`saying`).
+    `heading`: its group in the help. `needs`: a field that must be given, too; `apart`: a field that must not be given.
+    `alone`: the value of an option given without a value. An option of several commands is declared once, and may have
+    a different help text in each (`saying`).
     """
 
     def __init__(
@@ -126,7 +126,7 @@ class Options(msgspec.Struct, frozen=True, kw_only=True):
     """The group of the help for options that have no heading of their own."""
 
     def command_line(self) -> str:
-        """The command with what differs from its defaults, quoted for a shell."""
+        """The command line with all values that differ from the defaults, quoted for a shell."""
         return command_line(*self.COMMAND.split(), *self._words())
 
     def _words(self) -> Iterator[str]:
@@ -165,7 +165,7 @@ class Options(msgspec.Struct, frozen=True, kw_only=True):
 
 
 class _Field(NamedTuple):
-    """A field of a record: what was declared, or the record that it is."""
+    """A field of a record: its declaration, or the nested record."""
 
     name: str
     declared: Argument | Option | None
@@ -176,12 +176,12 @@ class _Field(NamedTuple):
 
     @property
     def several(self) -> bool:
-        """True if the value is a tuple of those on the command line."""
+        """True if the value is a tuple because the option may be repeated."""
         return self.declared.several if isinstance(self.declared, Argument) else self.default == ()
 
     @property
     def label(self) -> str:
-        """How a message calls it."""
+        """The name in messages."""
         if isinstance(self.declared, Argument):
             return self.declared.metavar.strip("[]")
         assert self.declared is not None
@@ -250,7 +250,7 @@ Record = TypeVar("Record", bound=Options)
 
 
 def _read(record: type[Record], given: dict[str, Any]) -> Record:
-    """The record with what the command line gave."""
+    """The record with the values from the command line."""
     return record(
         **{
             field.name: given[field.name] if field.record is None else _read(field.record, given)
@@ -260,7 +260,7 @@ def _read(record: type[Record], given: dict[str, Any]) -> Record:
 
 
 class DeclaredOption(click.Option):
-    """An option that knows its declaration."""
+    """A click option with its declaration."""
 
     def __init__(self, *args: Any, declared: Option, heading: str, **named: Any) -> None:
         super().__init__(*args, **named)

@@ -1,4 +1,4 @@
-"""Where the debug files and the C files of a firmware image are looked for: the options, and what they name."""
+"""The folders in which an image's debug files and C files are searched, and the options for them."""
 
 from __future__ import annotations
 
@@ -52,10 +52,8 @@ def is_robots_own(image: Image) -> bool:
 
 
 def source_folders(image: Image, given: Sequence[str] = ()) -> Sources:
-    """Where C files are looked for: the folders of --sources, the image's own (and the project's above `Objects`), and
-    for the robot's firmware that one's.
-
-    Raises BadInput for a folder that is not there.
+    """Folders in which C files are searched: those of --sources, the image's own (and the project's above `Objects`),
+    and for the robot's firmware its installed one. Raises BadInput for a folder that does not exist.
     """
     folders, own = [*map(Path, checked_sources(given)), *project_folders(image.path)], source_folder()
     if own is not None and is_robots_own(image):
@@ -64,7 +62,7 @@ def source_folders(image: Image, given: Sequence[str] = ()) -> Sources:
 
 
 def checked_sources(given: Sequence[str], option: str = "--sources") -> Sequence[str]:
-    """The folders of the option. Raises BadInput for what is not one."""
+    """The folders of the option. Raises BadInput for a path that is no folder."""
     for folder in given:
         if not Path(folder).is_dir():
             raise BadInput(folder, option, "there is no such folder", "name the one with the C files")

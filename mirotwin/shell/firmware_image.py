@@ -28,11 +28,11 @@ def load_firmware(
     named: bool = True,
     stack_from: int | None = None,
 ) -> Image:
-    """The firmware image at `path`, or the robot's own. What is parsed once (`image`) is not parsed again.
+    """The firmware image at `path`, or the robot's own. Parsed images are cached (`image`).
 
     `named`: its symbols are needed; the files beside it are read at once, and BadInput is raised for wrong ones.
-    `stack_from`: first address of its stack, which only an image without a linker's map may be given.
-    Raises BadInput for what is no image, or does not fit `limit` bytes.
+    `stack_from`: first address of its stack; allowed only for an image without a linker's map. Raises BadInput for a
+    file that is no image, or is larger than `limit` bytes.
     """
     file = Path(path) if path else image_path()
     check_regular(file)
@@ -74,6 +74,6 @@ def is_up(cpu: Cpu) -> bool:
 
 
 def not_up(image: Image, remedy: str, waited_ms: float = BOOT_MS) -> BadInput:
-    """What to raise for firmware that has not come up in time."""
+    """The error for firmware that has not booted in time."""
     reason = f"the firmware has not turned its serial receiver on {waited_ms:.0f} ms after power-on"
     return BadInput(image.path, "", reason, remedy)

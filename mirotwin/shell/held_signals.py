@@ -12,9 +12,8 @@ NAMES = ("SIGINT", "SIGTERM", "SIGHUP")
 
 
 class Hold:
-    """Signals wait within `with hold:`, which may be nested; `with hold.released():` lets them through again.
-
-    One that has waited raises when the outermost block is left, unless that is left by an exception.
+    """Delays signals within `with hold:`, which may be nested; `with hold.released():` lets them through again. A
+    delayed signal raises at the end of the outermost block, unless that block ends with an exception.
     """
 
     def __init__(self) -> None:
@@ -36,7 +35,7 @@ class Hold:
 
     @contextmanager
     def released(self) -> Iterator[None]:
-        """Within it, signals raise where the program stands."""
+        """Within this block, signals raise immediately."""
         depth, self._depth = self._depth, 0
         try:
             self._deliver()
@@ -58,7 +57,7 @@ class Hold:
 
 @contextmanager
 def held_signals() -> Iterator[Hold]:
-    """A Hold whose outermost block is this one; signals that are ignored or end the process stay as they are."""
+    """A Hold whose outermost block is this one; ignored signals and signals that end the process are not changed."""
     hold = Hold()
     with hold, handled_signals(NAMES, hold.take, callable) as hold.handlers:
         yield hold

@@ -38,6 +38,7 @@ def camera_name(camera: str) -> str:
 
 class Comparison(msgspec.Struct, frozen=True):
     """The paper's law against a rival with the same seeds, from `figure`'s start, under `camera`, compared by `error`.
+
     `settled`: settled runs of each law, of `runs`. Medians in cm, over the `pairs` in which both settle. `nearer`:
     advantage of the paper's law in the median pair, in cm. `by_settled`: the number of settled runs decides.
     """

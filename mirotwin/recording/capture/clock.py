@@ -21,8 +21,8 @@ _TIME = re.compile(TIME, re.IGNORECASE)
 
 
 class Clock:
-    """Reads times. One of day that goes back by hours has passed midnight. `resolution_ticks`: of what was read.
-    `assumed`: the unit that was taken for a whole number without one.
+    """Parses times. A time of day that goes back by hours has passed midnight. `resolution_ticks`: of the times read so
+    far. `assumed`: the unit assumed for an integer without one.
 
     A number without a point and a unit is taken as Unix time if it has the digits of one, else as ms.
     """
@@ -47,7 +47,7 @@ class Clock:
         return self._scaled(int(whole + part), len(part), _UNITS[unit.lower()])
 
     def of_text(self, text: str) -> int:
-        """Raises ValueError for what is no time."""
+        """The tick of a time. Raises ValueError for text that is no time."""
         text = text.strip()
         match = _TIME.fullmatch(text.removeprefix("-"))
         if match is None:

@@ -1,4 +1,4 @@
-"""Which form a file has, by its first 64 KiB.
+"""Detects the form of a file by its first 64 KiB.
 
 | the file begins with | it is |
 |---|---|
@@ -51,7 +51,7 @@ _SIGROK = (b"metadata", b"logic-1")
 
 
 class Detected(NamedTuple):
-    """`form`: of `FORMS`, "" for none. `why`: what it was recognised by, or what it is instead, and a remedy."""
+    """`form`: of `FORMS`, "" for none. `why`: the evidence, or for no form what the file is instead, and a remedy."""
 
     form: str
     why: str
@@ -108,7 +108,7 @@ def _by_first_bytes(head: bytes) -> Detected | None:
 
 
 def _lines(head: bytes, whole: bool) -> list[str]:
-    """The first lines that say something, without one that is cut."""
+    """The first non-empty lines, without a line that is cut off."""
     lines = head_lines(head, whole)
     if "\0" in lines[0][:_ENOUGH]:
         return []

@@ -84,7 +84,10 @@ def kind_of(lines: Sequence[str]) -> str:
 
 
 def read(lines: Iterator[str], facts: Facts, base: int) -> Iterator[Piece]:
-    """The bytes of a dump; the offset of the next line says how many of a line are meant, and what `*` stands for."""
+    """The bytes of a dump.
+
+    The number of bytes in a line, and the meaning of `*`, follow from the offset of the next line.
+    """
     held: _Row | None = None
     repeats = False
     missing = first_gap = 0
@@ -130,7 +133,7 @@ def _held_pieces(data: bytes, count: int, repeats: bool, label: str, number: int
 
 
 def fits_annotations(lines: Sequence[str]) -> int:
-    """How many lines are annotations of a serial decoder."""
+    """Number of lines that are annotations of a serial decoder."""
     if not any(map(_ANNOTATION.fullmatch, lines)):
         return 0
     return sum(bool(_OF_UART.match(line)) for line in lines)

@@ -1,4 +1,4 @@
-"""The forms of captures: what each is called, by which reader it is read, and what it can say."""
+"""The forms of captures: name, reader and properties of each."""
 
 from __future__ import annotations
 
@@ -24,8 +24,8 @@ Packets = Callable[[Callable[[int], bytes], str, Counter[str]], Iterator[Transmi
 
 
 class Form(msgspec.Struct, frozen=True):
-    """`name`: for `--from-form`. `title`: in messages. `timed`: its characters have times. `directed`: it can say who
-    sent. `read`: None for forms whose reader gives transmissions.
+    """`name`: for `--from-form`. `title`: in messages. `timed`: its characters have times. `directed`: it may contain
+    the direction. `read`: None for forms whose reader gives transmissions.
     """
 
     name: str

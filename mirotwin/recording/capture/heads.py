@@ -1,4 +1,4 @@
-"""The first transmissions of a source, and what they look like."""
+"""The first transmissions of a source, and the direction and layout guessed from them."""
 
 from __future__ import annotations
 

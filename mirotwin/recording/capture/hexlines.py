@@ -29,15 +29,15 @@ _HEAD = re.compile(
 )
 _BARE = re.compile(rf"\s*(?P<data>{CHARACTERS})\s*+{_END}", re.IGNORECASE)
 _ROW = re.compile(r"(?P<data>(?:[0-9A-F]{2} ){16}).{16}")
-"""Of jpnevulator --ascii, whose text follows one blank."""
+"""A row of jpnevulator --ascii, whose text follows one blank."""
 _NOT_DIGITS = re.compile(r"0x|[^0-9A-Fa-f]", re.IGNORECASE)
 _DIVIDER = re.compile(r"\s*(?:[-=*#/;].*)?")
 
 
 def fits(lines: list[str], loose: bool = False) -> int:
-    """How many of these lines are of this form: with a time that is plainly one, or in a block below one.
+    """Number of lines of this form: with an unambiguous time, or in a block below such a line.
 
-    `loose`: a whole number before a colon or the like is a time, too.
+    `loose`: an integer before a colon or similar counts as a time, too.
     """
     plain = sum(bool((match := _STAMPED.match(line)) and _is_plain(match, loose)) for line in lines)
     if plain > loose:  # one such line may be anything

@@ -17,7 +17,7 @@ _DIGIT = re.compile(rb"[0-9a-fA-F]")
 
 
 class HexError(BadInput):
-    """Text that is no pair of digits: path, line and column (from 1), what, remedy."""
+    """Text that is no pair of hex digits: path, line and column (from 1), reason, remedy."""
 
     def __init__(self, path: str, line: int, column: int, reason: str) -> None:
         remedy = "write two hex digits a character, or name another form with --from-form"
@@ -65,7 +65,7 @@ class HexText:
         return bytes.fromhex(_NOT_DIGITS.sub(b"", done).decode("ascii"))
 
     def finish(self) -> None:
-        """The text has ended, or cannot be read on: HexError if something was left over."""
+        """Ends the text. Raises HexError if a part of a pair is left over."""
         if not self._rest:
             return
         shown = self._rest[:1].decode("ascii", "backslashreplace")
@@ -79,7 +79,7 @@ class HexText:
         return bool(self._rest) and not self._pending()
 
     def _pending(self) -> bool:
-        """True if what is left over is the first half of something."""
+        """True if the remaining text is the first half of a pair or comment."""
         return BOM.startswith(self._rest) or (len(self._rest) == 1 and _DIGIT.match(self._rest) is not None)
 
     def _advance(self, text: bytes) -> None:

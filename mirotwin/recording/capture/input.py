@@ -1,4 +1,4 @@
-"""An open file or pipe whose first bytes can be looked at and which knows how far it was read."""
+"""An open file or pipe that supports peeking and counts the bytes read."""
 
 from __future__ import annotations
 
@@ -18,7 +18,7 @@ CHUNK_BYTES = 1 << 16
 
 
 class Input:
-    """`path` ("-": standard input), open for reading; `size` is None for a pipe; `position`: so much was read.
+    """`path` ("-": standard input), open for reading; `size` is None for a pipe; `position`: bytes read so far.
 
     Raises InputError for folders, named pipes, and devices other than the null device, OSError as `open` does.
     """
@@ -50,7 +50,7 @@ class Input:
         return self._file.isatty() or os.path.samestat(status, os.stat(os.devnull))
 
     def peek(self, size: int = HEAD_BYTES) -> bytes:
-        """The next bytes, which stay to be read: `size` of them, fewer only at the end."""
+        """The next `size` bytes without consuming them; fewer only at the end."""
         while len(self._head) < size and (more := self._file.read(size - len(self._head))):
             self._head += more
         return self._head[:size]
@@ -65,7 +65,7 @@ class Input:
         return taken
 
     def read_some(self) -> bytes:
-        """The next bytes as soon as there are any; empty at the end."""
+        """The next available bytes, waiting for the first; empty at the end."""
         if self._head:
             return self.read(len(self._head))
         read1 = getattr(self._file, "read1", self._file.read)
@@ -89,7 +89,7 @@ class Input:
 
     @classmethod
     def of(cls, data: bytes, path: str) -> Input:
-        """What was read of `path` already."""
+        """An input of `data`, read before from `path`."""
         given = cls.__new__(cls)
         given.path = given.label = path
         given.position, given._head = 0, b""

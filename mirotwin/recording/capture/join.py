@@ -1,8 +1,8 @@
-"""Pieces of a capture as transmissions: times near 0, characters that follow each other joined, in the order of time.
+"""Joins pieces of a capture to transmissions: times near 0, consecutive characters joined, in the order of time.
 
-A receiver takes characters 1040 us apart, give or take 50 us, as following each other; so it is done here, with the
-step of the file's times added. Characters that would begin before the one before them has ended, because times are
-coarse or the sender is faster than the line, come right behind it.
+Like a receiver, this module takes characters 1040 +- 50 us apart as consecutive, with the step of the file's times
+added to the tolerance. A character that would begin before the end of the previous one, because times are coarse or the
+sender is faster than the line, is placed right behind it.
 """
 
 from __future__ import annotations
@@ -24,14 +24,14 @@ from mirotwin.recording.capture.serial_line import standard_baud
 FAR_TICKS = 10 * TICKS_PER_SECOND
 """A capture that begins later than this is moved by whole seconds."""
 LONGEST = 1 << 12
-"""Characters of a transmission; what follows goes on in the next."""
+"""Longest transmission in characters; the rest continues in the next."""
 _HEAD = 512
 _USUAL_BAUD = 9600
 _TOLD_TICKS = TICKS_PER_SECOND // 100
 
 
 class _Open:
-    """A transmission that may go on. `next_tick`: where its next character is due, as the sender sends."""
+    """A transmission that may continue. `next_tick`: expected tick of its next character at the sender's rate."""
 
     def __init__(self, piece: Piece, tick: int) -> None:
         self.direction = piece.direction
@@ -90,7 +90,7 @@ class Joiner:
             raise failure
 
     def _prepared(self) -> Iterator[Piece]:
-        """The pieces with times near 0, once the sender's rate is known from the first of them."""
+        """The pieces with times near 0; they are held until the sender's rate is known from the first of them."""
         head, pieces = peeked(self._pieces, _HEAD, lambda piece: len(piece.data) == 1)
         facts = self.facts
         facts.spacing_ticks = facts.spacing_ticks or (
@@ -159,7 +159,7 @@ class Joiner:
         self._count += 1
 
     def _ready(self) -> Iterator[Transmission]:
-        """Those before which nothing comes any more."""
+        """The transmissions before which no further one can come."""
         first = min((group.tick for group in self._open.values()), default=None)
         while self._done and (first is None or self._done[0][0] <= first):
             yield heapq.heappop(self._done)[-1]

@@ -1,4 +1,6 @@
-"""How many robots a network has, if the file does not say: the number with which more frames can be decoded."""
+"""The number of robots in a network, if the file does not contain it: the number with which more frames can be
+decoded.
+"""
 
 from __future__ import annotations
 
@@ -34,9 +36,9 @@ def robots_in(head: Sequence[Transmission], network: int) -> tuple[int, str]:
 
 
 class Layouts:
-    """3 or 5 for each network: as the user `requested`, else as the file says, else as its `head` looks.
+    """Network -> 3 or 5: as the user `requested`, else from the file, else guessed from its `head`.
 
-    `tell` receives a note for the user about a choice that was not plain.
+    `tell` gets a note for the user about an uncertain guess.
     """
 
     def __init__(
@@ -71,7 +73,7 @@ class Layouts:
 
 
 def look(source: Source, requested: int | None, tell: Callable[[str], None]) -> Layouts:
-    """Looks at the beginning of `source` for the layout, where nobody says."""
+    """Reads the beginning of `source` to find the layout, unless it is given."""
     head: list[Transmission] = []
     if requested is None:
         head, source.sent = head_of(source.sent)

@@ -28,7 +28,7 @@ DEFINITIONS = 1 << 14
 """Signals of a VCD file."""
 _RATE = re.compile(r"([0-9]+(?:\.[0-9]+)?)\s*([kmg]?)(?:hz)?", re.IGNORECASE)
 _DAMAGED = (zipfile.BadZipFile, zlib.error, NotImplementedError, RuntimeError, OSError, ValueError, EOFError)
-"""What `zipfile` raises for a damaged file."""
+"""Exceptions of `zipfile` for a damaged file."""
 _PREFIXES = {"": 1, "k": 10**3, "m": 10**6, "g": 10**9}
 _SCALES = {"s": 1, "ms": 10**3, "us": 10**6, "ns": 10**9, "ps": 10**12, "fs": 10**15}
 

@@ -15,7 +15,7 @@ DIRECTIONS = {"down": DOWN, "up": UP}
 
 
 class CaptureOptions(Options, frozen=True, kw_only=True):
-    """How a capture is read, where it does not say."""
+    """Options for reading a capture, for properties that the file does not contain."""
 
     HEADING = "A capture"
     from_form: Annotated[

@@ -1,4 +1,4 @@
-"""What readers of captures give: characters as the file has them, and what it says about itself."""
+"""The output of capture readers: characters, and facts about the file."""
 
 from __future__ import annotations
 
@@ -15,8 +15,9 @@ Item = TypeVar("Item")
 
 
 class Piece(NamedTuple):
-    """Characters in a row. `tick` (24 MHz) is None where they follow the piece before; `direction` is "" where the file
-    does not say. `line` numbers the wires of a capture.
+    """Consecutive characters. `tick` (24 MHz): None if they follow the piece before; `direction`: "" if unknown.
+
+    `line`: number of the wire.
     """
 
     tick: int | None
@@ -27,10 +28,10 @@ class Piece(NamedTuple):
 
 
 class Facts:
-    """What is known of a capture, by its user or by its reader.
+    """Facts about a capture, from its user or its reader.
 
     `resolution_ticks`: step of the file's times. `spacing_ticks`: from one start bit to the next as it was sent, 0 if
-    not known. `baud`, `channels`: what the user requested. `offset_s`: so much was taken from all times.
+    not known. `baud`, `channels`: requested by the user. `offset_s`: subtracted from all times.
     """
 
     def __init__(
@@ -52,7 +53,7 @@ class Facts:
         self._first = self._first or place
 
     def tell_passed_over(self, read_any: bool) -> None:
-        """Reports what was passed over. Raises InputError if that was all there was."""
+        """Reports skipped input. Raises InputError if nothing else was read (`read_any` false)."""
         if not self._foreign:
             return
         kinds = ", ".join(amount(count, kind) for kind, count in sorted(self._foreign.items()))
@@ -69,9 +70,9 @@ _DIRECTION = re.compile(
 
 
 def direction_in(words: str) -> str:
-    """The direction that words such as `ttyUSB0 TX`, `<` or `[RX] -` name, as the PC sees it; "" for none.
+    """The direction named by words such as `ttyUSB0 TX`, `<` or `[RX] -`, from the PC's view; "" for none.
 
-    `->` is none: terminals write it between the time and what they received.
+    `->` names none: terminals write it between the time and the received text.
     """
     match = _DIRECTION.search(words)
     return "" if match is None else UP if match["up"] else DOWN

@@ -1,7 +1,7 @@
 """The characters in a recording (`run.mcap`), in the order of time.
 
-A recording holds the characters of each control period. A transmission of a robot that goes on over the end of a
-period is put together again here.
+A recording contains the characters of each control period. A robot's transmission that crosses the end of a period is
+joined again here.
 """
 
 from __future__ import annotations
@@ -29,8 +29,8 @@ def transmissions(
 ) -> Iterator[Transmission]:
     """Transmissions in the order of time; `robots` is filled with the layout (3 or 5) of each network before the first.
 
-    RecordingError, after all that could be read, for what is no recording of this program, and for a part of a copy.
-    `tell` is called with a message for a recording whose run was broken off, after all its transmissions.
+    Raises RecordingError, after everything readable, for a file that is no recording of this program, and for an
+    incomplete copy. For a recording of an interrupted run `tell` gets a message, after all its transmissions.
     """
     messages = Messages(source.read, source.label, (channels.WireMessage, channels.PeriodMessage))
     order = _Order()
@@ -74,7 +74,7 @@ def units_line(label: str, crystal_hz: int) -> str:
 
 
 def _crystal_hz(messages: Messages, tell: Callable[[str], None]) -> int:
-    """Ticks per second of a recording; tells what is otherwise about one of a board."""
+    """Ticks per second of a recording; reports the deviations of a board's recording through `tell`."""
     metadata = messages.metadata or {}
     if "board" in metadata:
         tell(f"{messages.path}: is of a board, whose bytes are no frames of robots; what was put is left out")
@@ -102,7 +102,7 @@ def _ordered(messages: Messages, order: _Order, robots: dict[int, int]) -> Itera
 
 
 def _take_layouts(messages: Messages, robots: dict[int, int]) -> None:
-    """How many robots each network has; a scenario that this version cannot read does not say."""
+    """Fills in the number of robots in each network; nothing for a scenario that this version cannot read."""
     text = messages.attachments.pop(SCENARIO_ATTACHMENT, None)
     if text is not None:
         try:
@@ -113,7 +113,7 @@ def _take_layouts(messages: Messages, robots: dict[int, int]) -> None:
 
 
 class _Order:
-    """Puts transmissions in the order of time, those together that go on over the end of a period.
+    """Sorts transmissions by time, and joins those that cross the end of a period.
 
     `last`: transmissions of the period that has no end yet.
     """
@@ -125,13 +125,13 @@ class _Order:
         self._count = 0
 
     def close(self, tick: int, period: Sequence[Transmission]) -> list[Transmission]:
-        """All that can be given out when the period that began at `tick` is complete."""
+        """The transmissions that are final when the period that began at `tick` is complete."""
         self.last = ()
         self._take(period)
         return self._before(min([tick, *(sent.tick for sent in self.open.values())]))
 
     def rest(self) -> list[Transmission]:
-        """The rest, at the end of the input."""
+        """The remaining transmissions, at the end of the input."""
         self._take(self.last)
         for sent in self.open.values():
             self._push(sent)

@@ -5,7 +5,7 @@ The JSON form, for programs:
 * first `{"event": "input", "file", "format", "timed", "units": {field: unit}}`
 * `{"event": "frame", "offset", "tick", "time_s", "direction", "network", "type", "seq", "fresh", "fields", "data"}`;
   `tick` and `time_s` are null where the input has no times, `fresh` is null for telemetry, `fields` is null and
-  `unknown` says why for a frame whose CRC is good but whose content is unknown
+  `unknown` gives the reason for a frame with a good CRC but unknown content
 * `{"event": "damage", "offset", "tick", "time_s", "direction", "network", "reason", "data"}`
 * last `{"event": "end", ...counts}`, and before it `{"event": "error", "text"}` when the input could not be read on
 """
@@ -56,7 +56,7 @@ def head_line(timed: bool) -> str:
 
 
 def table_line(row: DecodedRow, timed: bool) -> str:
-    """One row; damage shows its first bytes."""
+    """One row as text; damage with its first bytes."""
     event = row.event
     tick = event.start_tick
     position = f"{tick:>12}  {seconds(tick):>10.4f}" if timed else f"{row.offset:>10}"
@@ -80,7 +80,7 @@ def kind(event: Received, message: Message | None) -> str:
 
 
 def described(row: DecodedRow) -> str:
-    """A few words: what a frame is, or what is wrong with these bytes. The comment in a stream file."""
+    """A short description of a frame or of the damage; it becomes the comment in a stream file."""
     event = row.event
     if isinstance(event, Damaged):
         return f"{amount(len(event.data), 'byte')}, {reason(event)}"
@@ -173,14 +173,17 @@ PIECE_BYTES = 1 << 16
 
 
 class ConversionError(BadInput):
-    """Transmissions that the other format cannot hold: tick, what, remedy."""
+    """Transmissions that the other format cannot express: tick, reason, remedy."""
 
     def __init__(self, tick: int, problem: str, remedy: str) -> None:
         super().__init__("", f"tick {tick}", problem, remedy)
 
 
 def to_pcapng(sent: Iterable[Transmission]) -> Iterator[bytes]:
-    """A packet a transmission, an interface a network. One that is longer than a packet may be goes on in the next."""
+    """One packet per transmission, one interface per network.
+
+    A transmission longer than a packet continues in the next.
+    """
     return pcapng.blocks(_packets(sent))
 
 
@@ -201,14 +204,11 @@ def to_stream(
     source: Source | None = None,
     actions: Iterable[ScriptItem] = (),
 ) -> Iterator[bytes]:
-    """A line a transmission, with its content as comment. ConversionError for ticks that go backwards.
+    """One line per transmission, with its content as comment. Raises ConversionError for ticks that go backwards.
 
-    `actions`, in the order of their ticks, get a line each among them.
-
-    What `source` notes of itself follows the first line.
-
-    The first line names the version, which is known after the last transmission: until then lines wait in a
-    temporary file.
+    `actions`, sorted by tick, get a line each among them. The notes of `source` follow the first line. The first line
+    contains the format version, which is known only after the last transmission: until then lines wait in a temporary
+    file.
     """
     version, last = 1, 0
     with tempfile.TemporaryFile() as lines:

@@ -20,7 +20,7 @@ class DecodedRow(msgspec.Struct, frozen=True):
     """One frame or damaged run.
 
     `offset` counts the characters of this network and direction before it. `fresh` is None for damage and for
-    telemetry, `message` for damage and for unknown content (then `unknown` says why).
+    telemetry, `message` for damage and for unknown content (`unknown` is the reason then).
     """
 
     offset: int
@@ -49,7 +49,7 @@ class _Decoding:
         self.end_tick = 0
 
     def hear(self, sent: Transmission | None) -> Iterator[DecodedRow]:
-        """Rows that these characters complete; None ends the input: the pending characters are no frame then."""
+        """Rows completed by these characters. None ends the input: the pending characters are then no frame."""
         self.end_tick = self.end_tick if sent is None else sent.end_tick
         source = self.robot or self.decoder
         for reception in source.flush() if sent is None else source.hear(sent):
@@ -69,9 +69,8 @@ class _Decoding:
 
 
 def rows(sent: Iterable[Transmission], layout: Callable[[int], int]) -> Iterator[DecodedRow]:
-    """Rows in the order in which their last characters came. An error of `sent` comes after all before it.
-
-    After a pause of two characters or more what came before it cannot become a frame any more: it is given out.
+    """Rows in the order of their last characters. An error raised by `sent` comes after all rows before it. After a
+    pause of two characters or more, earlier characters cannot become a frame, so they are yielded as damage.
     """
     decodings: dict[tuple[int, str], _Decoding] = {}
     failure: Exception | None = None

@@ -1,4 +1,4 @@
-"""Characters (8N1) from the levels of wires; how long a bit is comes from the edges, where nobody says."""
+"""Decodes characters (8N1) from the levels of wires; an unknown bit length is estimated from the edges."""
 
 from __future__ import annotations
 
@@ -22,7 +22,7 @@ STANDARD_BAUDS = (
 
 
 class Change(NamedTuple):
-    """From `tick` on the wire `line` has this level; what it was before is not known at its first change."""
+    """Level of the wire `line` from `tick` on; the level before the first change is unknown."""
 
     tick: int
     line: int
@@ -35,7 +35,7 @@ def standard_baud(baud: float) -> int:
 
 
 class _Wire:
-    """One wire, decoded."""
+    """The decoder of one wire."""
 
     def __init__(self, line: int, bit_ticks: float, idle: int) -> None:
         self.line = line

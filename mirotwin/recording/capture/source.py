@@ -35,7 +35,7 @@ _ESCAPED = re.compile(r"[\udc80-\udcff]")
 
 
 class Source(msgspec.Struct):
-    """`sent` in the order of the file; `robots` (network -> 3 or 5) is what the file itself says about layouts."""
+    """`sent` in the order of the file; `robots`: network -> 3 or 5, from the file itself."""
 
     label: str
     form: Form
@@ -75,9 +75,8 @@ def open_capture(
     options: CaptureOptions = AS_IT_SAYS,
     form: Form | None = None,
 ) -> Source:
-    """`form` None: as the options say, or as it is recognised. Reading may raise one of `READ_ERRORS`, and so may this.
-
-    `tell` gets what the user should hear: what the file was taken for, what was passed over, how times were moved.
+    """`form` None: from the options, or detected. Reading may raise one of `READ_ERRORS`, and so may this. `tell` gets
+    notes for the user: the detected form, skipped input, and the shift of times.
     """
 
     def say(line: str) -> None:
@@ -103,7 +102,7 @@ def timed_capture(
     options: CaptureOptions = AS_IT_SAYS,
     form: Form | None = None,
 ) -> Source:
-    """As `open_capture`, for a replay. Raises InputError for a form without times, unless they are assumed."""
+    """Like `open_capture`, for a replay. Raises InputError for a form without times, unless times are assumed."""
     source = open_capture(given, tell, options, form)
     if not source.timed and not options.assume_contiguous:
         remedy = "--assume-contiguous takes all characters to follow each other without a pause"
@@ -114,10 +113,9 @@ def timed_capture(
 def _directed(
     sent: Iterator[Transmission], form: Form, requested: str | None, facts: Facts
 ) -> Iterator[Transmission]:
-    """With directions and networks instead of wires, as the beginning looks.
-
-    A wire that does not say who sends carries what its beginning decodes as. What was captured at the robot says TX of
-    what the robot sends: it is turned round. Wires of both directions are one network.
+    """Assigns directions and networks to wires. The direction of an undirected wire is guessed from its beginning. A
+    capture made at the robot has TX for the robot's characters: its directions are swapped. Two wires of opposite
+    directions are one network.
     """
     head: list[Transmission]
     first, sent = peeked(sent, 1)

@@ -39,7 +39,7 @@ _BINARY = re.compile(r"\s*0b((?:[01] ?){1,8})\s*")
 
 class Table(msgspec.Struct, frozen=True):
     """The columns of a table. `kind`: characters, edges or samples; `rate_hz` and `start`, of samples: per second, and
-    the first row. `unit`: of its times, if it says.
+    the first row. `unit`: of its times, if the table contains it.
     """
 
     kind: str
@@ -77,7 +77,7 @@ class Table(msgspec.Struct, frozen=True):
 
 
 def table_of(lines: Sequence[str]) -> Table | None:
-    """The table that begins with these lines."""
+    """The columns of the table that begins with these lines; None if it is no table."""
     rate = 0.0
     for number, line in enumerate(lines):
         if not line.strip() or line.startswith((";", "#")):

@@ -55,7 +55,9 @@ def lines_of(given: Input) -> Iterator[str]:
 
 
 def _encoding(head: bytes, whole: bool) -> tuple[str, int]:
-    """The encoding, and the length of the mark that says so; UTF-16 also by the zeros between ASCII."""
+    """The encoding, and the length of its byte-order mark; UTF-16 is also detected by the zeros between ASCII
+    characters.
+    """
     sample = head[: len(head) & ~1]
     for first, encoding in ((0, "utf-16-be"), (1, "utf-16-le")):
         if len(sample) >= 4 and not any(sample[first::2]) and all(sample[1 - first :: 2]):

@@ -1,1 +1,1 @@
-"""The paper's theory along a run: what is saved of each control period, and the figures that it comes to."""
+"""The paper's theory along a run: values saved in each control period, and the resulting figures."""

@@ -1,11 +1,11 @@
-"""What a controller asks of the wheels: its effort, and a chattering index, how far speeds go back and forth.
+"""A controller's demands on the wheels: its effort, and a chattering index for speeds that go back and forth.
 
-The total variation of what a controller puts out, TV = sum |u(k+1) - u(k)|, is the usual measure of its smoothness
-(S. Skogestad, J. Process Control 13 (2003) 291, doi:10.1016/S0959-1524(02)00062-8). It counts a turn or a start that
-the path needs as well. So the net motion is taken away: in each window of ten control periods the variation less
-|u(last) - u(first)|. What is left is 0 for speeds that only rise or only fall within a window, twice the swing for
-those that come back. It is added up over the windows, and given for one wheel and second of command: m/s per s. The
-effort is TV itself, in the same unit: the mean size of the commanded acceleration of a wheel.
+The total variation of a controller's output, TV = sum |u(k+1) - u(k)|, is the usual measure of its smoothness (S.
+Skogestad, J. Process Control 13 (2003) 291, doi:10.1016/S0959-1524(02)00062-8). It counts a turn or a start that the
+path needs as well. So the net motion is taken away: in each window of ten control periods the variation less |u(last) -
+u(first)|. The rest is 0 for speeds that only rise or only fall within a window, and twice the swing for those that come
+back. It is summed over the windows, and given per wheel and second of command: m/s per s. The effort is TV itself, in
+the same unit: the mean size of the commanded acceleration of a wheel.
 """
 
 from miro_host.wheels import Wheels
@@ -16,7 +16,7 @@ _UNITS_PER_M_S = Wheels().units_per_m_s
 
 
 class Chattering:
-    """Takes commands in 1/256 count per sample, as the station sends them; integers, so that nothing is rounded."""
+    """Sums up commands in 1/256 count per sample, as the station sends them; integers, so nothing is rounded."""
 
     def __init__(self) -> None:
         self.commands = 0

@@ -1,4 +1,4 @@
-"""What the paper's theory says of a run, as figures: the `theory` part of `summary.json` and a line on the screen."""
+"""Figures of the paper's theory for a run: the `theory` part of `summary.json` and a line on the screen."""
 
 from __future__ import annotations
 
@@ -31,8 +31,9 @@ class SlidingGains(msgspec.Struct, frozen=True):
 class DisturbanceFigures(msgspec.Struct, frozen=True):
     """f of equation (15) over the run's control periods, against the gains of condition (17).
 
-    `*_above_*`: the share of the periods in which |f_i| is greater than P_i, and than the authority, what P_i leaves
-    inside the boundary layer: P_i |sat(s_i / layer_i)|, with s_i as the law saw it. None where the law has no P_i.
+    `*_above_*`: the share of the periods in which |f_i| is greater than P_i, and greater than the authority, the part
+    of P_i that is active inside the boundary layer: P_i |sat(s_i / layer_i)|, with s_i as computed by the law. None for
+    a law without P_i.
     """
 
     f1_rms_m_s2: float
@@ -76,11 +77,11 @@ class Assumption3(Assumption, frozen=True):
 
 
 class Theory(msgspec.Struct, frozen=True):
-    """One robot. Everything is of the truth, which no host knows, at the exposures; times are whole control periods.
+    """Figures of one robot, from the true state (unknown to a host) at the exposures; times are whole control periods.
 
-    `reversals`: changes between forward and backward; `backward_s`: time with v < -1 cm/s. `chattering_m_s2`: how far
-    the commanded wheel speeds go back and forth within a third of a second; `effort_m_s2`: the mean size of a wheel's
-    commanded acceleration (both: `chattering`).
+    `reversals`: changes between forward and backward; `backward_s`: time with v < -1 cm/s. `chattering_m_s2`:
+    back-and-forth motion of the commanded wheel speeds within a third of a second; `effort_m_s2`: the mean size of a
+    wheel's commanded acceleration (both: `chattering`).
     """
 
     disturbance: DisturbanceFigures | None
@@ -176,7 +177,7 @@ def _share_above(values: array[float], bound: float | None) -> float | None:
 def _share_above_authority(
     values: array[float], surfaces: array[float], gain: float | None, layer: float | None
 ) -> float | None:
-    """None also where the law does not say its surface."""
+    """The share of periods with |f_i| above the authority; None also for a law that does not name its surface."""
     if gain is None or len(surfaces) != len(values):
         return None
     pairs = zip(values, surfaces, strict=True)
@@ -185,14 +186,14 @@ def _share_above_authority(
 
 
 def authority(surface: float, gain: float, layer: float | None) -> float:
-    """How large the switching term is: the gain, and less of it inside the layer."""
+    """Size of the switching term: the gain, reduced inside the layer."""
     if layer is None:
         return gain if surface else 0.0
     return gain * min(1.0, abs(surface) / layer)
 
 
 def theory_text(theory: Theory) -> str:
-    """The figures in a line for people: what holds is left out, but for condition (17)."""
+    """The figures in one line: assumptions that hold are left out, but condition (17) is always given."""
     parts = []
     third, f = theory.assumption_3, theory.disturbance
     for number, broken in enumerate((theory.assumption_1, theory.assumption_2), 1):

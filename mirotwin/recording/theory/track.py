@@ -1,11 +1,11 @@
-"""The paper's theory along a run: what is noted of each control period while the run is under way.
+"""The paper's theory along a run: values collected in each control period.
 
-Of each period f and the surfaces are kept; the rest is counted.
+f and the surfaces of each period are stored; everything else is counted.
 
 f is that of equation (15), f = z_r' + u - z', over one control period: z_r' + u is the change of the commanded velocity
 by the command that was computed at the period's exposure, after its limits; z' is the change of the true velocity from
-this exposure to the next. So f holds all that lies between command and motion: the dead time above all, the LM629's
-slope, radio, wheel radii, quantum. Everything else is of the true posture at the exposure.
+this exposure to the next. So f contains all effects between command and motion: mainly the dead time, then the LM629's
+slope, radio, wheel radii, quantum. All other values are computed from the true posture at the exposure.
 
 The paper's assumptions on a trajectory:
 
@@ -70,7 +70,7 @@ class Broken:
 
 
 class Turns:
-    """An angle in (-pi, pi] that is followed without jumps: how many turns it has left that range by."""
+    """An angle in (-pi, pi] followed without jumps; it counts how many turns the angle has left that range by."""
 
     __slots__ = ("_last", "turns")
 
@@ -88,7 +88,7 @@ class Turns:
 
 
 class TheoryTrack:
-    """One robot. `now` is what its recording says of the last period that was added; None before a host steers it."""
+    """One robot. `now`: the recorded values of the last added period; None before a host steers it."""
 
     def __init__(self) -> None:
         self.f1_m_s2 = array("d")
@@ -111,7 +111,7 @@ class TheoryTrack:
         self._surfaces: tuple[float, float] | None = None
 
     def add(self, robot: RobotPeriod, tick: int) -> None:
-        """Takes over what is needed of the next control period."""
+        """Adds the next control period."""
         f = self._disturbance(robot, tick)
         rho_c, across_rad = radius(robot.truth), across(robot.truth)
         holds = (
@@ -181,7 +181,7 @@ class TheoryTrack:
                 self.backward += 1
 
     def _steer(self, robot: RobotPeriod) -> None:
-        """The demand of this period's command; nothing, if the host gave none."""
+        """Stores the demand of this period's command; nothing if the host gave none."""
         control = robot.control
         if control is None:
             self._demand = None

@@ -1,4 +1,4 @@
-"""A firmware as people know it: where an address stands in it, by symbol, C line and text."""
+"""A firmware with its names: symbol, C line and text of an address."""
 
 from __future__ import annotations
 
@@ -19,9 +19,8 @@ from mirotwin.shell.debug_files import debugged_image, is_robots_own
 
 
 class CodeLocation(Record, frozen=True):
-    """An instruction that was executed at `tick`. `line`: `failsafe.c:41`, None where no debug file has it.
-
-    `symbol` with offset; `source`: what stands in that line, None where the file is not there; `text` disassembled.
+    """An instruction that was executed at `tick`. `line`: `failsafe.c:41`, None if no debug file contains it. `symbol`
+    with offset; `source`: the text of that line, None without the file; `text`: disassembly.
     """
 
     tick: int
@@ -40,14 +39,12 @@ class CodeLocation(Record, frozen=True):
 
 
 NOWHERE = Path("no-such-folder") / "image.ihx"
-"""Of an image whose debug files are to be left alone."""
+"""Path of an image whose debug files must not be read."""
 
 
 class AnnotatedImage:
-    """One image with its debug files, as far as they are there. `sources`: where C files may be. `clock`: ticks a
-    second where it runs.
-
-    `problem`: why the debug files are not used, where they belong to another image.
+    """One image with its debug files, if they exist. `sources`: folders of C files. `clock`: ticks per second of its
+    runs. `problem`: the reason why debug files are not used, if they belong to another image.
     """
 
     def __init__(self, image: Image, sources: Sources) -> None:
@@ -79,9 +76,9 @@ def annotated_of(image: Image, images: Sequence[Image], sources: Sequence[str]) 
 
 
 def same_layout(image: Image, other: Image) -> bool:
-    """True if all code, and what has a name, lies at the same addresses in both: then PC is compared with PC.
+    """True if all code and all named variables have the same addresses in both, so PCs can be compared.
 
-    Where one of them has no symbols, the extent of the code decides.
+    If one image has no symbols, the extent of the code decides.
     """
     if image.used != other.used:
         return False
@@ -90,7 +87,7 @@ def same_layout(image: Image, other: Image) -> bool:
 
 
 def changed_instructions(image: Image, other: Image) -> list[int]:
-    """Addresses at which an instruction may begin that differs between two images of the same layout."""
+    """Start addresses of instructions that may differ between two images of the same layout."""
     addresses = set()
     for address, (here, there) in enumerate(zip(image.code, other.code, strict=False)):
         if here != there:

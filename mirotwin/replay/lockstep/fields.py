@@ -1,4 +1,4 @@
-"""Fields of two states that differ, by name: the path in the tables of state, and what it is called in the firmware."""
+"""Fields that differ between two states, with the path in the state tables and the firmware's name."""
 
 from __future__ import annotations
 
@@ -35,7 +35,7 @@ def variables(image: Image) -> list[tuple[int, str]]:
 
 
 def name_of_byte(image: Image, address: int) -> str:
-    """`_last_left+1`, `R3 of bank 1`, `stack`, or "" where nothing is known."""
+    """`_last_left+1`, `R3 of bank 1`, `stack`; "" for a byte without a name."""
     places = variables(image)
     index = bisect.bisect_right(places, (address, "\uffff")) - 1
     if index >= 0:
@@ -49,7 +49,7 @@ def name_of_byte(image: Image, address: int) -> str:
 
 
 def extents(image: Image) -> dict[str, tuple[int, int]]:
-    """Name -> (first address, bytes) of each variable; nothing of what lies on the stack.
+    """Name -> (first address, bytes) of each variable outside the stack.
 
     Sizes come from the debug file; without one a variable ends where the next begins.
     """
@@ -118,7 +118,7 @@ class FieldDifference(Record, frozen=True):
 
 
 def differing(world: World, other: World) -> Iterator[FieldDifference]:
-    """The fields that differ, item by item, of those that both worlds have and that enter a digest."""
+    """The fields that differ, item by item, of the fields that both worlds have and that enter a digest."""
     first, second = world.state, other.state
     values, others = first.decode(first.save()), second.decode(second.save())
     for path, value in values.items():
@@ -156,7 +156,7 @@ def _is_apart(root: Any, path: str) -> bool:
 
 
 def item_differences(value: Any, other: Any, path: str = "") -> Iterator[tuple[str, Value, Value]]:
-    """(`[3]`, `.x_m`, .., or "" for what has no items; both values) of what differs."""
+    """Path (`[3]`, `.x_m`, ..; "" for a value without items) and both values of each difference."""
     if _bits(value) == _bits(other):
         return
     items, others = _items(value), _items(other)

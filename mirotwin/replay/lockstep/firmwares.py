@@ -1,9 +1,9 @@
-"""What two firmwares do otherwise in one run: the first instruction, or the first variables, and how that was found.
+"""The first difference in the behaviour of two firmwares in one run: an instruction or variables, and the method used.
 
-Where the code of one build lies elsewhere in the other, it is found by symbols, and within a function instruction by
-instruction. A piece of code reaches from one symbol to the next. Two pieces of one name are compared as text, in which
-addresses have their names, so that a call to a function that moved is the same call. An address that is loaded in two
-halves has no name there, and counts as changed where it moved.
+Code that moved between the builds is matched by symbols, and within a function instruction by instruction. A piece of
+code reaches from one symbol to the next. Two pieces of one name are compared as text, in which addresses have their
+names, so that a call to a function that moved is the same call. An address loaded in two halves has no name in the
+text, so it counts as changed if it moved.
 """
 
 from __future__ import annotations
@@ -26,7 +26,7 @@ from mirotwin.replay.lockstep.variables import Builds, VariableDifference
 _OFFSET = re.compile(r"\+(0x[0-9a-f]+|\d+|[0-9A-F]+h)")
 _ADDRESS = re.compile(r"\b([0-9A-F]{4,5})h")
 Instruction = tuple[int, bytes, str]
-"""Address, bytes, and text without what depends on where the code lies."""
+"""Address, bytes, and text without the parts that depend on the code's address."""
 NAMED = 5
 
 
@@ -70,7 +70,7 @@ def moved(image: AnnotatedImage, other: AnnotatedImage) -> Moved:
 
 
 def _pieces(annotated: AnnotatedImage) -> dict[str, tuple[int, int]]:
-    """Name -> where the code begins and ends, in the order of addresses; none without symbols."""
+    """Name -> first and last address of the code, sorted by address; empty without symbols."""
     image, pieces = annotated.image, dict[str, tuple[int, int]]()
     if image.symbols.problem is not None or not image.symbols.names:
         return pieces
@@ -92,7 +92,9 @@ def _instructions(annotated: AnnotatedImage, address: int, end: int) -> Iterator
 
 
 def _differing(instructions: list[Instruction], other: list[Instruction]) -> Iterator[tuple[int, int]]:
-    """Addresses in both at which the instructions begin to differ; at the end of a piece those of its last one."""
+    """Addresses in both pieces where the instructions begin to differ; at the end of a piece the addresses of its last
+    instruction.
+    """
     if [len(code) for _, code, _ in instructions] == [len(code) for _, code, _ in other]:
         for (here, code, text), (there, code_there, text_there) in zip(instructions, other, strict=True):
             if code != code_there and text != text_there:
@@ -114,10 +116,8 @@ Make = Callable[[Image], World]
 
 
 class FirmwareDifference(Record, frozen=True):
-    """What two firmwares do otherwise. `changed`, `effect`: of images of the same layout; `mapped`, the first changed
-    instruction by symbols, and `variables`: of others.
-
-    `notes`: what was compared, and what is missing.
+    """The differences of two firmwares. `changed`, `effect`: for images of the same layout; `mapped` (the first changed
+    instruction, matched by symbols) and `variables`: for other images. `notes`: methods used, and missing data.
     """
 
     changed: InstructionDifference | None = None

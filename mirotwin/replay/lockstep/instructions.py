@@ -1,9 +1,9 @@
-"""The first instructions that two firmwares of the same layout execute otherwise.
+"""The first instructions that two firmwares of the same layout execute differently.
 
-Two instructions are looked for. *Changed*: the first one executed whose code is not the same; found at full speed, by
-marks at all changed places. *Effect*: the one after which the processors' states are not the same again. The worlds'
-states are compared every millisecond; from the last time they are the same on, each step is. An effect that is gone
-within a millisecond does not count; then only the first changed instruction is reported.
+Two instructions are searched. *Changed*: the first executed instruction with different code; found at full speed, by
+marks at all changed addresses. *Effect*: the instruction after which the processors' states stay different. The worlds'
+states are compared every millisecond, and after the last equal comparison at each step. An effect that vanishes within
+a millisecond does not count; then only the first changed instruction is reported.
 """
 
 from __future__ import annotations
@@ -30,7 +30,10 @@ if TYPE_CHECKING:
     from miro_sim.world.world import World
 
 STEPPED_TICKS = 4 * CONTROL_PERIOD_TICKS
-"""How long each step is compared at most: as long again the states differ, but not for what a processor does."""
+"""Longest comparison of single steps.
+
+If it finds nothing, the states differ, but not by an instruction of a processor.
+"""
 LASTING_TICKS = 12_012
 """For how long states must differ so that it is an effect: half a millisecond, no part of one."""
 REGISTERS = {
@@ -40,7 +43,7 @@ REGISTERS = {
 }  # fmt: skip
 _RAM_BYTES = 0x100
 DERIVED = ("instructions", "idle_cycles", "blocked")
-"""Counts that follow from the others: left out."""
+"""Counts that follow from others; not compared."""
 
 
 class ValueDifference(Record, frozen=True):
@@ -54,7 +57,7 @@ class ValueDifference(Record, frozen=True):
 class InstructionDifference(Record, frozen=True):
     """The instruction at which two firmwares differ, and the registers and variables that differ after it.
 
-    `parted`: the instruction, of the first firmware, behind which they go on at different places.
+    `parted`: the first firmware's instruction after which both continue at different addresses.
     """
 
     network: int
@@ -76,9 +79,9 @@ class ExecutedInstruction(NamedTuple):
 
 
 class LiveState:
-    """The state of a processor without what lies above its stack pointer: nobody reads that before it is written.
+    """The state of a processor without the bytes above its stack pointer, which are written before they are read.
 
-    `stack`: where the stack begins; None: not known, and all of RAM counts.
+    `stack`: first address of the stack; None: unknown, then all RAM counts.
     """
 
     def __init__(self, cpu: Cpu, stack: int | None) -> None:
@@ -95,7 +98,7 @@ class LiveState:
 
 
 class Processors(WorldPair):
-    """Two worlds whose processors alone are compared."""
+    """Two worlds of which only the processors are compared."""
 
     def __init__(self, world: World, other: World) -> None:
         super().__init__(world, other)
@@ -112,7 +115,7 @@ class Processors(WorldPair):
 
 
 class InstructionLog(Watcher):
-    """Keeps what a device's processor does, until `detach`."""
+    """Records the instructions of a device's processor until `detach`."""
 
     def __init__(self, device: Device, stack: int | None) -> None:
         self.device = device
@@ -139,7 +142,7 @@ class Stepper:
         self.annotated = annotated
 
     def changed(self, until_tick: int) -> InstructionDifference | None:
-        """The first changed instruction that is executed, and what it does in both."""
+        """The first changed instruction that is executed, with its effect in both worlds."""
         world, other = self.pair.one, self.pair.other
         event = first_reached(world, changed_instructions(world.image, other.image), until_tick)
         if event is None:
@@ -204,7 +207,7 @@ class Stepper:
 def first_reached(
     world: World, addresses: Iterable[int], until_tick: int, devices: Sequence[Device] | None = None
 ) -> Event | None:
-    """Runs to where one of these devices (None: of all) is to execute what lies at one of the addresses."""
+    """Runs to the moment at which one of these devices (None: any) is about to execute one of the addresses."""
     conditions = [
         Reached(address=address, network=device.network, slot=device.slot)
         for device in (devices or world.devices)

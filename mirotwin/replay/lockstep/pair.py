@@ -3,8 +3,9 @@
     found = mirotwin.replay.first_difference(one, other)
     print(found)       # tick 1203 (0.000050 s): lines[0].devices[0].board.cpu.iram[35h] ..
 
-States are compared every millisecond, then within the first one that differs in shorter steps, down to a tick. What
-differs and is the same again between two looks is not seen: a register, say, that is overwritten at once.
+States are compared every millisecond, then within the first millisecond with a difference in shorter steps, down to a
+tick. A difference that vanishes between two comparisons, such as a register that is overwritten at once, is not
+detected.
 """
 
 from __future__ import annotations
@@ -60,7 +61,7 @@ class WorldPair:
 
     @property
     def over(self) -> bool:
-        """True if one of them does not go on."""
+        """True if one of the worlds has ended."""
         return self.one.stopped or self.other.stopped
 
     def run_to(self, tick: int) -> None:
@@ -84,9 +85,8 @@ class WorldPair:
         self.other.go_back(marks[1])
 
     def narrow(self, step_ticks: int, end_tick: int) -> int | None:
-        """Runs both in steps up to `end_tick`, to the first place where they differ, and goes back to the one before.
-
-        Returns the tick of that place. None: there is none, and both stand at the end.
+        """Runs both in steps up to `end_tick`. Returns the first step's tick at which they differ, and restores both to
+        the step before. None: there is no difference, and both are at the end.
         """
         while self.tick < end_tick and not self.over:
             before = self.mark()
@@ -102,12 +102,13 @@ class WorldPair:
 def first_difference(
     world: World, other: World, until_tick: int | None = None, look_ticks: int = LOOK_TICKS
 ) -> StateDifference | None:
-    """The first tick at which the states of two worlds differ, from where both stand up to `until_tick`.
+    """The first tick at which the states of two worlds differ, from their present tick up to `until_tick`.
 
-    Default: to the end of the shorter one. None: they never do, looked at every `look_ticks`. Both worlds are left at
-    the tick that was found. What enters no digest is not compared: how early input was announced. Worlds of other
-    scenarios are compared in the fields that both have. Both go back and on again, so their observers are
-    called twice for some periods. Raises ValueError unless both stand at one tick, and for steps that do not exist.
+    Default: to the end of the shorter one. None: no difference at any comparison, every `look_ticks`. Both worlds are
+    left at the returned tick. Fields that enter no digest are not compared, such as how early input was announced.
+    Worlds of different scenarios are compared in the fields that both have. Both are run back and forth, so their
+    observers are called twice for some periods. Raises ValueError if both are not at the same tick, and for an invalid
+    `look_ticks`.
     """
     if look_ticks < 1:
         raise ValueError(f"look_ticks is {look_ticks}: give 1 or more")

@@ -1,9 +1,10 @@
-"""Where two builds go apart whose code lies at other addresses: the first variables that differ, and who wrote them.
+"""Compares two builds with code at different addresses: the first variables that differ, and the instructions that
+wrote them.
 
-Such builds execute nothing at the same address, and most things at other times. They are compared where both processors
-sleep, and so have done all there was to do: every half millisecond the variables that both symbol files name. Ignore
-timer variables: they differ between builds of another speed. Variables that still differ at the end are listed by when
-that began, and with the last instruction of each build that changed them.
+Such builds have different addresses and different times. Every half millisecond, if both processors sleep and so have
+finished their work, the variables named in both symbol files are compared. Ignore timer variables: they differ between
+builds of another speed. Variables that still differ at the end are listed in the order in which the differences began,
+with the last instruction of each build that changed them.
 """
 
 from __future__ import annotations
@@ -23,7 +24,11 @@ if TYPE_CHECKING:
     from miro_sim.world.world import Mark, World
 
 LOOK_TICKS = 12_012
-"""No part of a millisecond: what the firmware does once a millisecond must not be awake at each look."""
+"""Comparison interval in ticks.
+
+It is no divisor of a millisecond: work that the firmware does every millisecond must not be under way at each
+comparison.
+"""
 TRACED = 3
 _INTEGERS = (1, 2, 4)
 Key = tuple[int, int, str]
@@ -83,7 +88,7 @@ class Builds:
         ]
 
     def _look(self, before: tuple[Mark, Mark]) -> bool:
-        """Compares the variables of each device whose processors sleep; whether all do."""
+        """Compares the variables of each device whose processors both sleep; returns True if all sleep."""
         slept = True
         for device, twin in zip(self.pair.one.devices, self.pair.other.devices, strict=True):
             if not (device.board.cpu.idle and twin.board.cpu.idle):

@@ -1,7 +1,7 @@
 """A recording with Foxglove's topics beside its own, as another recording: `mirotwin export run.mcap --out fox.mcap`.
 
-The result holds every record of the recording as it is, but for the frames of cameras, which stand in it once, in
-Foxglove's form. So what reads recordings reads it too. The same recording gives the same bytes.
+The result contains every record of the recording unchanged, except camera frames, which it contains once, in Foxglove's
+form. So it is readable as a recording, too. The same recording gives the same bytes.
 """
 
 from __future__ import annotations
@@ -43,7 +43,7 @@ FAULT = "fault"
 class Conversion:
     """Writes a recording with Foxglove's topics. `path` names it in errors. Raises BadInput.
 
-    `images` that were written; `notes`: what is missing, and why, a line each.
+    `images`: number of images written; `notes`: missing items with reasons, a line each.
     """
 
     def __init__(self, data: bytes, path: str, stream: BinaryIO) -> None:

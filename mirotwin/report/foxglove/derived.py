@@ -1,6 +1,5 @@
-"""From a run to Foxglove's messages: what control periods, frames and faults become.
-
-What stands still is written again each second, for viewers that jump.
+"""Converts control periods, frames and faults to Foxglove's messages. Static objects are written again each second, for
+viewers that jump in time.
 """
 
 from __future__ import annotations
@@ -19,7 +18,7 @@ from mirotwin.report.foxglove.messages import FrameTransforms, SceneEntity, Scen
 from mirotwin.report.foxglove.shapes import Point
 
 AGAIN = 30
-"""Control periods from one message about what stands still to the next."""
+"""Control periods between two messages about static objects."""
 
 
 class ErrorMessage(msgspec.Struct, frozen=True):
@@ -34,7 +33,7 @@ class ErrorMessage(msgspec.Struct, frozen=True):
 
 
 class DerivedMessage(NamedTuple):
-    """A message for a topic. `tick`: of what it shows."""
+    """A message for a topic. `tick`: of its content."""
 
     topic: str
     tick: int
@@ -44,7 +43,7 @@ class DerivedMessage(NamedTuple):
 class Derived:
     """Foxglove's messages of a run, one control period after the other.
 
-    `scenario` None: it is not known; then there are no camera, no ball, no patches and no references.
+    `scenario` None: unknown; then there are no camera, no ball, no patches and no references.
     """
 
     def __init__(self, scenario: Scenario | None) -> None:

@@ -1,9 +1,9 @@
-"""Where things are: the frames of a run as one tree, under the pitch's own.
+"""The coordinate frames of a run as one tree, below the pitch's own.
 
 pitch                          the paper's axes on the floor, z up, m
   net0/robot0                  the robot's truth: x ahead, y left, origin on the floor under its centre
-  net0/robot0/measured         what its PC measured last; it stays where it was while the robot is lost
-  net0/robot0/reference        where it should be
+  net0/robot0/measured         last measurement of its PC; unchanged while the robot is lost
+  net0/robot0/reference        its reference posture
   net0/camera                  the lens: x right in the picture, y down, z into it
 """
 
@@ -52,7 +52,7 @@ UPSIDE_DOWN = Quaternion(1.0, 0.0, 0.0, 0.0)
 
 
 def transform(network: int, lens: CameraParameters, time: Timestamp) -> FrameTransform:
-    """Where the camera hangs and where it looks: turned, tilted, and upside down."""
+    """Position and orientation of the camera: turned, tilted, and upside down."""
     turned = _about(lens.turn_rad, (0.0, 0.0, 1.0))
     tilted = _product(_about(lens.tilt_x_rad, (1.0, 0.0, 0.0)), _about(lens.tilt_y_rad, (0.0, 1.0, 0.0)))
     place = Vector3(lens.x_m, lens.y_m, lens.height_m)

@@ -17,7 +17,7 @@ from mirotwin.recording.channels import time_of as time_of
 Timestamp = Annotated[TimeMessage, msgspec.Meta(title="time")]
 Duration = Annotated[TimeMessage, msgspec.Meta(title="duration")]
 ALWAYS = TimeMessage(0, 0)
-"""The lifetime of what stays until it is replaced."""
+"""Lifetime of objects that stay until they are replaced."""
 
 
 class Vector3(msgspec.Struct, frozen=True):
@@ -46,7 +46,7 @@ class Color(msgspec.Struct, frozen=True):
 
 
 class FrameTransform(msgspec.Struct, frozen=True):
-    """Where the child frame lies in the parent frame."""
+    """Pose of the child frame in the parent frame."""
 
     timestamp: Timestamp
     parent_frame_id: str

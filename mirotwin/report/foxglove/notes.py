@@ -1,6 +1,5 @@
-"""What is worth a line in a log: faults of the firmware, frames and robots that were lost, resets.
-
-A line is written when something begins and when it is over, not once a control period.
+"""Log lines: firmware faults, lost frames and robots, resets. A line is written when a condition begins and when it
+ends, not every control period.
 """
 
 from __future__ import annotations

@@ -38,7 +38,7 @@ from mirotwin.report.foxglove.shapes import Point
 
 HALF_M = ROBOT_HALF_MM / 1000.0
 TOP_M = 0.002
-"""How thick the black top is drawn, and the patches on it."""
+"""Drawn thickness of the black top and of the patches on it, in metres."""
 OUTLINE_M = 0.002
 LABEL_Z_M = 0.11
 MEASURED = Color(1.0, 0.85, 0.1, 1.0)
@@ -87,17 +87,20 @@ def _outline(frame: str, color: Color, time: Timestamp) -> SceneEntity:
 
 KEPT = 30
 EVERY = 5
-"""A trail has so many points, one in so many control periods: the last five seconds. A run of hours has an end."""
+"""Control periods between two points of a trail of `KEPT` points: the last five seconds.
+
+So a run of hours stays drawable.
+"""
 MOST = 500
 """Points of a reference."""
 STEP_M, STEP_RAD = 0.02, 0.1
-"""How far a reference goes or turns from point to point, at most."""
+"""Largest distance and turn of a reference between two points, in m and rad."""
 TRAIL_Z_M, PATH_Z_M = 0.004, 0.003
 WIDE_M = 0.003
 
 
 class Trail:
-    """Where one robot was, in truth and as measured."""
+    """The true and the measured path of one robot."""
 
     def __init__(self) -> None:
         self._truth: deque[Point] = deque(maxlen=KEPT)
@@ -118,7 +121,7 @@ class Trail:
 
 
 def reference_points(robot: RobotSpec, duration_s: float) -> tuple[Point, ...]:
-    """The whole path that a robot is to go; none for one of another distribution that fails."""
+    """The whole reference path of a robot; empty if a trajectory of another distribution fails."""
     try:
         trajectory = reference_for(robot, duration_s)
         postures = [trajectory.at(at_s).posture for at_s in _instants(trajectory, duration_s)]
@@ -135,7 +138,7 @@ def reference_line(network: int, slot: int, points: Iterable[Point], time: Times
 
 
 def _instants(trajectory: Trajectory, duration_s: float) -> Iterator[float]:
-    """Times from begin to end, no more than `MOST` of them."""
+    """Times from begin to end, at most `MOST`."""
     until_s, step_s = duration_s, duration_s / MOST
     if isinstance(trajectory, Paced):
         pace = trajectory.pace(STEP_M, STEP_RAD)

@@ -33,7 +33,7 @@ def heading(theta_rad: float) -> Quaternion:
 
 @cache
 def paint(name: str) -> Color:
-    """How a paint of the scene looks on a screen."""
+    """Screen colour of a paint of the scene."""
     red, green, blue = (exp(SCREEN_GAMMA * log(part / 1000.0)) for part in PAINTS[name])
     return Color(red, green, blue, 1.0)
 

@@ -1,4 +1,4 @@
-"""What all figures look like: frame, axes, grid, tools, and colours by name."""
+"""The common look of all figures: frame, axes, grid, tools, and colours by name."""
 
 from __future__ import annotations
 
@@ -67,7 +67,7 @@ def _style(axis: Any, label: str) -> None:
 
 
 def time_range(times_s: list[float], period_s: float) -> Range1d:
-    """From the first period to the end of the last one, and no further by any tool."""
+    """The range from the first period to the end of the last one; tools cannot leave it."""
     first, last = (times_s[0], times_s[-1] + period_s) if times_s else (0.0, 1.0)
     return Range1d(start=first, end=last, bounds=(first, last), min_interval=period_s / 8)
 

@@ -23,7 +23,9 @@ from mirotwin.report.page.run_page import Material, shared
 from mirotwin.shell.json_text import json_bytes
 
 MOST_LANES = 32
-"""Nets that are drawn: those with most edges, in the order of the board; those with as many as the last one, too."""
+"""Largest number of nets drawn: those with most edges, in the order of the board; ties with the last one are drawn,
+too.
+"""
 MOST_ROWS = 400
 """Largest number of lines of serial text that are listed."""
 LONGEST_ROW = 80
@@ -143,7 +145,9 @@ def _together(numbers: Sequence[Changed], scenario: BoardScenario) -> list[list[
 
 
 def _rows(wire: Sequence[Transmission], clock: int, character_ticks: int) -> list[SerialRow]:
-    """What was sent, each way in lines: to a line end, a pause, or what went the other way."""
+    """The characters of each direction, broken into lines at line ends, pauses, and characters of the other
+    direction.
+    """
     rows: list[SerialRow] = []
     end_tick = 0
     for sent in sorted(wire, key=lambda transmission: transmission.tick):
@@ -165,7 +169,7 @@ def _goes_on(line: bytes, character: bytes) -> bool:
 
 
 def _marks(material: Material, wire: Sequence[Transmission], scenario: BoardScenario) -> list[LinkMark]:
-    """Steps, what was done, characters and faults, each on its lane."""
+    """Steps, actions, characters and faults, each on its lane."""
     short = scenario.clock * MARK_MS // 1000
     marks = [
         LinkMark("steps", "damaged" if failed else ("fresh", "repeated")[number % 2], begin, end, text)

@@ -1,7 +1,4 @@
-"""The figures of a board's run against time: what happened, the nets as lanes, the values of parts.
-
-All share one range of time.
-"""
+"""The figures of a board's run against time: events, nets as lanes, values of parts. All share one time range."""
 
 from __future__ import annotations
 
@@ -28,19 +25,19 @@ from mirotwin.report.page.plots import MOST_FAILURES, lanes_figure
 
 LANE_PX = 24
 HIGH, LOW = 0.36, -0.3
-"""Where the levels of a lane are drawn; lanes are 1 apart."""
+"""Heights of the levels in a lane; lanes are 1 apart."""
 FINEST_S = 20e-6
 """The shortest time that fills a figure: two characters at 1 Mbaud, some instructions."""
 LABEL, LABEL_PX = 20, 136
 """Characters of a lane's name that there is room for, and that room, the same in all figures."""
 LEAST_SHARE, LEAST = 0.01, 0.001
-"""An axis of values spans so much of the greatest at least, and so much."""
+"""Smallest span of an axis of values: as a share of the largest value, and absolute."""
 TEXT_SHARE, TEXT_ALPHA = 0.011, 0.3
 """The share of a figure's width that a character takes."""
 
 
 class Window:
-    """The ticks that a page shows, and what they are in seconds."""
+    """The ticks that a page shows, and their conversion to seconds."""
 
     def __init__(self, first_tick: int, end_tick: int, clock: int) -> None:
         self.first_tick, self.end_tick, self.clock = first_tick, end_tick, clock
@@ -91,7 +88,7 @@ def _waves(waves: Sequence[Wave], window: Window) -> Any:
 
 
 def _label(wave: Wave) -> str:
-    """The name of a net, and what is on it: P1.1 eyes.trig."""
+    """The name of a net with the pins on it: P1.1 eyes.trig."""
     text = " ".join([wave.name, *wave.on_it[:1]])
     return text if len(text) <= LABEL else f"{text[: LABEL - 1]}\u2026"
 
@@ -112,7 +109,7 @@ def _wave(made: Any, wave: Wave, row: int, window: Window) -> None:
 
 
 def _states(states: Sequence[LinkMark], window: Window) -> Any:
-    """Texts and what is on as bars, with the text where there is room in a wide window; the page hides it else."""
+    """Texts and on-states as bars, with text if there is room in a wide window; the page hides it otherwise."""
     made = lanes_figure(states, window.times, window.seconds, {colour: colour for colour in ROBOT_COLOURS})
     for bars in made.renderers:
         bars.glyph.fill_alpha = TEXT_ALPHA
@@ -129,7 +126,7 @@ def _states(states: Sequence[LinkMark], window: Window) -> Any:
 
 
 def _curves(together: Sequence[Changed], window: Window) -> Any:
-    """Values of one kind: each holds until the next change that was seen. Of equal ones all can be seen."""
+    """Values of one kind: each holds until its next change. Equal curves are drawn so that all are visible."""
     made = panel("", window.times, height=116)
     everything = np.concatenate([np.array(changed.values, dtype=np.float64) for changed in together])
     if (ends := at_least(max(LEAST_SHARE * np.abs(everything).max(), LEAST), everything)) is not None:

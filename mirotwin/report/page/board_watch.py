@@ -1,7 +1,7 @@
-"""What the nets and the parts of a board do while it runs: all edges, and all changes of values.
+"""Records the nets and parts of a running board: all edges, and all changes of values.
 
-Values are looked at every millisecond and right after each put (`Changes`). What is too much to be drawn is thinned
-here, so that a page can say where.
+Values are sampled every millisecond and right after each put (`Changes`). Data too dense to be drawn is thinned here,
+so that a page can mark the places.
 """
 
 from __future__ import annotations
@@ -20,7 +20,7 @@ from miro_sim.world.world import World
 MOST_EDGES = 6000
 """Largest number of edges of a net that are drawn one by one."""
 MOST_VALUES = 3000
-"""Largest number of changes of a value that are kept."""
+"""Largest number of changes stored for a value."""
 TOGETHER = 3
 """Fewer edges than that in a stretch are drawn one by one."""
 
@@ -56,7 +56,7 @@ class Changed(NamedTuple):
 
 
 class BoardWatch:
-    """Watches the first board of a world from where it stands to its end; changes no bit of its run."""
+    """Watches the first board of a world from its present tick to its end; the run's bits do not change."""
 
     def __init__(self, world: World) -> None:
         self._world, self.begin_tick = world, world.tick
@@ -76,7 +76,7 @@ class BoardWatch:
         world.observers.append(self._look)
 
     def _look(self, period: Period) -> None:
-        """Takes over what the period has left, before the logs forget it."""
+        """Copies the period's events before the logs overwrite them."""
         for tick, net, _ in self._observer.take(self._world.tick):
             self._edges[net].append(tick)
         log = self._changes.values
@@ -106,7 +106,7 @@ class BoardWatch:
         ]
 
     def values(self, first_tick: int, end_tick: int) -> list[Changed]:
-        """All values within these ticks; the first is that at their begin."""
+        """All values within these ticks; the first one is the value at `first_tick`."""
         changed = []
         for path, (ticks, values) in self._values.items():
             first = max(0, int(np.searchsorted(ticks, first_tick, side="right")) - 1)
@@ -117,7 +117,7 @@ class BoardWatch:
         return changed
 
     def changes(self, end_tick: int) -> list[tuple[int, str, str, Any]]:
-        """All nets and values at the begin, and each change of one: tick, kind, name, what it is from then on."""
+        """All nets and values at the begin, then each change: tick, kind, name, new value."""
         rows = [
             (tick, "value", path, value)
             for path, (ticks, values) in self._values.items()
@@ -130,7 +130,7 @@ class BoardWatch:
 
 
 def _thinned(values: list[Any], first: int, end: int) -> list[int]:
-    """The places that are kept: all, else the first, least, greatest and last of each stretch."""
+    """The indices to keep: all; if there are too many, the first, least, greatest and last of each stretch."""
     if end - first <= MOST_VALUES:
         return list(range(first, end))
     size, kept = -(-4 * (end - first) // MOST_VALUES), set[int]()

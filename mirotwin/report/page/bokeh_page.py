@@ -1,9 +1,9 @@
-"""Bokeh's part of a page: its JavaScript from the wheel, and the figures as JSON that is the same each time.
+"""Bokeh's part of a page: its JavaScript from the wheel, and the figures as reproducible JSON.
 
 Bokeh numbers its models from 1000 on in each process, so a second page in one process would have other numbers: they
-are numbered from 1 in the order of the page. Colours are names (`ink`, `truth`): tags like
-`line_color=truth` on a model say which of its properties has which colour, and the page puts them in, for light and for
-dark. bokeh is loaded when it is used; it comes with the extra `report`.
+are numbered from 1 in the order of the page. Colours are names (`ink`, `truth`): tags like `line_color=truth` on a
+model name the colour of a property, and the page sets the colours for its light and dark themes. bokeh is loaded when
+it is used; it comes with the extra `report`.
 """
 
 from __future__ import annotations
@@ -28,7 +28,7 @@ def require_bokeh() -> None:
 
 
 def javascript() -> str:
-    """Bokeh's own, without widgets and tables, fit to stand in a page."""
+    """Bokeh's JavaScript without widgets and tables, escaped for use inside a page."""
     from bokeh.resources import Resources
 
     return "\n".join(Resources(mode="inline", components=["bokeh"], minified=True).js_raw).replace(
@@ -65,5 +65,5 @@ def _numbered_anew(text: bytes) -> bytes:
 
 
 def island(data: bytes) -> str:
-    """JSON fit to stand in a script element."""
+    """JSON escaped for use inside a script element."""
     return data.decode().replace("&", "\\u0026").replace("<", "\\u003c").replace(">", "\\u003e")

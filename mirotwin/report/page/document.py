@@ -67,7 +67,7 @@ def check_size(page: bytes, name: str, remedy: str) -> None:
 
 
 def place_of_page(out: Path | None, force: bool, *inputs: str | None) -> Path:
-    """Where a page goes: `out`, else report.html, which replaces an earlier page. Raises BadInput; needs Bokeh."""
+    """Path of the page: `out`, else report.html, which replaces an earlier page. Raises BadInput; needs Bokeh."""
     if out is None:
         out = Path("report.html")
         force = force or is_page(out)

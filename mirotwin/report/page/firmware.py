@@ -1,6 +1,6 @@
 """The lines of the firmware that ran, as rows of a page.
 
-Source files go by their names alone: a page says nothing of the folders of the machine that made it.
+Source files are listed without their folders, so a page reveals no paths of the machine that made it.
 """
 
 from __future__ import annotations

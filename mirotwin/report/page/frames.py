@@ -31,7 +31,7 @@ class CameraFrame(msgspec.Struct, frozen=True):
 
 
 class Extras(msgspec.Struct, frozen=True):
-    """The content of a recording besides control periods. `broken_off`: its run did not come to its end."""
+    """The content of a recording besides control periods. `broken_off`: its run was interrupted."""
 
     frames: Sequence[CameraFrame] = ()
     samples: Sequence[tuple[RobotId, SampleMessage]] = ()

@@ -1,12 +1,11 @@
-"""What was on the air: each transmission of a host, what became of it at each robot, and the answers.
+"""Traffic on the air: each transmission of a host, its fate at each robot, and the answers.
 
 A host's transmission that holds a frame has a fate at each robot of its network: `fresh` (a valid frame with a new
 number arrived), `repeated` (a valid frame that is not), `damaged` (characters that are no frame), `lost` (nothing),
-`open` where the run ended before it could have arrived.
-Where a robot hears nothing fresh for so long that its failsafe orders the wheels to stop (`stopped`) or the motors off
-(`off`), that has a lane of its own.
-What arrives belongs to the last transmission before it, shifted by the radio's latency. Characters that come at other
-times are `noise` on an idle carrier.
+`open` (the run ended before it could have arrived). If a robot receives nothing fresh for so long that its failsafe
+orders the wheels to stop (`stopped`) or the motors off (`off`), this is shown on a separate lane. Received characters
+belong to the last transmission before them, shifted by the radio's latency. Characters at other times are `noise` on an
+idle carrier.
 """
 
 from __future__ import annotations
@@ -37,7 +36,7 @@ ROBOT_CHARACTER_TICKS = CHARACTER_BITS * ROBOT_BIT_TICKS
 TOGETHER_TICKS = 3 * ROBOT_CHARACTER_TICKS
 """Characters with a longer pause between them are two noises."""
 SLACK_TICKS = 24_000
-"""By so much a frame may arrive before it should: rounding of delays."""
+"""A frame may arrive earlier than calculated by this much, because delays are rounded."""
 
 
 class LinkMark(msgspec.Struct, frozen=True):
@@ -83,7 +82,7 @@ class Arrivals:
         self._receiver = RobotReceiver(robots)
 
     def look(self, restarts: Sequence[Event]) -> None:
-        """Takes over what is new; a robot that begins again knows nothing of before."""
+        """Processes new events; after a restart a robot has no memory of earlier frames."""
         own = [event for _, event in self._log.read() if event.what in ("received", "command")]
         for event in sorted([*own, *restarts], key=lambda event: event.tick):
             if event.what == "received":
@@ -120,7 +119,7 @@ class Arrivals:
 
 
 class LinkLog:
-    """Watches the air of a world while it runs. `marks` is for the end."""
+    """Watches the air of a world while it runs. Call `marks` at the end."""
 
     def __init__(self, world: World) -> None:
         self.world = world
@@ -135,7 +134,7 @@ class LinkLog:
         world.observers.append(self.look)
 
     def look(self, period: Period) -> None:
-        """Takes over what the logs have that is new."""
+        """Processes the logs' new entries."""
         self.wire += period.wire
         for network in self.world.networks:
             index = network.index
@@ -250,7 +249,7 @@ def _stops(robot: RobotId, arrivals: Arrivals, over_tick: int) -> list[LinkMark]
 
 
 def _together(ticks_of: Sequence[int]) -> list[tuple[int, int, int]]:
-    """Begin, end and number of characters that come close to each other."""
+    """Begin, end and number of characters of each dense group."""
     spans: list[tuple[int, int, int]] = []
     for tick in ticks_of:
         end = tick + ROBOT_CHARACTER_TICKS

@@ -1,4 +1,4 @@
-"""The page of two runs, one over the other: what they were made from, where they first differ, what each did."""
+"""The page of two runs, drawn over each other: their sources, the first difference, the motion of each."""
 
 from __future__ import annotations
 
@@ -19,7 +19,7 @@ from mirotwin.runs.summary import rms_name, settling_text, tracking_of
 
 NAMES = ("A", "B")
 RULE = CompareRule(host=True)
-"""All that is recorded, but for the digests: bytes of a stack that nobody reads are enough for another one."""
+"""Everything recorded, except digests: unused bytes of a stack are enough to change a digest."""
 
 
 class Side(NamedTuple):
@@ -94,7 +94,7 @@ def _of_one_law(difference: Difference) -> bool:
 
 
 def _common(first: Side, other: Side) -> tuple[list[RobotId], list[str]]:
-    """The robots that both have, and what there is to know of the rest. Raises BadInput."""
+    """The robots that both runs have, and remarks on the others. Raises BadInput."""
     here, there = robots_of(first.periods), robots_of(other.periods)
     common = [robot for robot in here if robot in there]
     if not common:
@@ -123,7 +123,7 @@ def _common(first: Side, other: Side) -> tuple[list[RobotId], list[str]]:
 
 
 def _rows(sides: Sequence[Side], tracks: Sequence[PageTracks]) -> list[tuple[str, list[str]]]:
-    """Name and values of what each run came to."""
+    """Name of a property, and its value for each run."""
     images = [side.job.spec.image for side in sides]
     rows = [
         ("scenario", [side.job.spec.scenario.name for side in sides]),

@@ -1,6 +1,5 @@
-"""The figures of two runs against time, one over the other: errors, how far apart they are, commands, speeds, wheels.
-
-The first run is drawn broad and below, the second narrow and above it: where they do the same both are seen.
+"""The figures of two runs against time, drawn over each other: errors, distance, commands, speeds, wheels. The first
+run is a broad line below, the second a narrow line above it, so both are visible where they are equal.
 """
 
 from __future__ import annotations

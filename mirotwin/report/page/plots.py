@@ -35,7 +35,7 @@ KIND_COLOURS = {
     "damaged": "bad",
     "lost": "lost",
 }
-"""Kinds of marks and their colours, in the order in which they are drawn: what went wrong lies on top."""
+"""Colours of the kinds of marks, in drawing order: failures are drawn last, on top."""
 HEIGHTS = {"noise": 0.26, "damaged": 0.94, "lost": 0.94}
 """Heights of marks as a share of their lane; 0.6 for all others."""
 LEAST_M_S, LEAST_RAD_S = 0.01, 0.1

@@ -1,4 +1,4 @@
-"""The page of a talk with robots at a port: what they answered beside what their twin answered, and where they part."""
+"""The page of a talk with robots at a port: their answers beside their twin's, and the differences."""
 
 from __future__ import annotations
 
@@ -50,7 +50,7 @@ def port_page(job: Job, quiet: bool) -> bytes:
 
 
 def _marks(differences: Sequence[Difference], slot: int, channel: str) -> list[float]:
-    """When robot and twin part in the channel."""
+    """Times at which robot and twin differ in the channel."""
     parted = [
         difference
         for difference in differences
@@ -75,7 +75,7 @@ def _figure(pairs: Sequence[Pair], channel: str, end_s: float, marks: list[float
 
 
 def _course(answers: Sequence[LogEntry], channel: str) -> list[int]:
-    """The channel from answer to answer: what went on is added up."""
+    """The channel from answer to answer; increments are summed."""
     take, _ = FIELDS[channel]
     if channel == "flags":
         return [int(answer.said.flags) for answer in answers]

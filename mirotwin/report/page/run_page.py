@@ -1,4 +1,4 @@
-"""The page of one run: what its header says, its sections, and the data that its JavaScript moves."""
+"""The page of one run: the facts of its header, its sections, and the data for its JavaScript."""
 
 from __future__ import annotations
 
@@ -35,16 +35,15 @@ from mirotwin.verify.cases.case import tables_of
 SILENT = "silent"
 MARGIN_CM = 3.0
 ROOM_CM = 142.0 * ground.ROBOT_HALF_M - MARGIN_CM
-"""Beyond the margin, what a robot at the end of its path needs: half its diagonal."""
+"""Space beyond the margin for a robot at the end of its path: half its diagonal, in cm."""
 MOST_POINTS = 4000
 """Largest number of points of a path; a longer one is drawn with every second point, or every third, and so on."""
 
 
 class Material(msgspec.Struct, frozen=True, kw_only=True):
-    """All that a page is made from. `kind`: run, case or failed test; `name`: of a test, whose `report` it left.
-
-    `periods`: those that are drawn; `command` gives it again; `notes`: what is to be known before all else, a line
-    each. `replayed`: what is compared with the recorded run, "" for nothing; `differences`: where they differ.
+    """The data of a page. `kind`: run, case or failed test; `name`: of a test, with its `report`. `periods`: the drawn
+    ones; `command` makes the page again; `notes`: shown first, a line each. `replayed`: name of the run compared with
+    the recorded one, "" for none; `differences`: between the two.
     """
 
     kind: str
@@ -116,7 +115,7 @@ def shared(material: Material, clock: int) -> dict[str, Any]:
 
 
 class Body(msgspec.Struct, frozen=True):
-    """A robot on the pitch. `dots`: its measured places as one SVG path; `seen`: whether the last of them is drawn."""
+    """A robot on the pitch. `dots`: its measured places as one SVG path; `seen`: the last measurement is drawn."""
 
     colour: int
     label: str
@@ -143,7 +142,7 @@ class Pitch(msgspec.Struct, frozen=True):
 
 
 def pitch_of(tracks: PageTracks, bodies: Sequence[tuple[int, str]] = (), seen: bool = True) -> Pitch:
-    """`bodies`: colour and label of each; default: those of one run, with what the camera measured if it is `seen`."""
+    """`bodies`: colour and label of each; default: the robots of one run, with camera measurements if `seen`."""
     paths, drawn = [], []
     corners = [
         (100.0 * ground.LEFT_M, 100.0 * ground.BOTTOM_M),
@@ -200,7 +199,7 @@ def _verdict(material: Material) -> tuple[str, str]:
 
 
 def _facts(material: Material, tracks: PageTracks) -> list[tuple[str, str, str]]:
-    """Name, what is shown, and the whole of it where that is shortened."""
+    """Name, displayed text, and the full text if that is shortened."""
     digest, image = material.again.digest, material.job.spec.image
     if material.periods and material.replayed:
         digest = material.periods[-1].digest
@@ -228,7 +227,7 @@ def page_data(
 ) -> bytes:
     """The data of the page's JavaScript: postures as 64-bit floats in base64, so that none is rounded.
 
-    `ticks`: of failures. `pairs`: so many robots are compared, each with the one that comes so many after it.
+    `ticks`: of failures. `pairs`: number of compared robots; robot i is compared with robot i + `pairs`.
     """
     lanes = lanes_of(marks)
     kinds = list(dict.fromkeys(mark.kind for mark in marks))
@@ -270,7 +269,7 @@ def _packed(postures: Postures, count: int) -> list[str]:
 
 
 def _base64(numbers: Column, count: int) -> str:
-    """Little-endian, `count` of them: NaN after the end of a run that is shorter than the other one of its page."""
+    """`count` little-endian numbers; NaN after the end of the shorter run of a page with two runs."""
     values = np.asarray(numbers, "<f8")
     return base64.b64encode(
         np.append(values, np.full(count - len(values), np.nan)).astype("<f8").tobytes()

@@ -1,7 +1,7 @@
-"""The columns of `recording.track` with those that a page alone shows: velocities, and what each wheel did.
+"""The columns of `recording.track`, and further ones for pages: velocities, and the motion of each wheel.
 
-The LM629's velocity is known at each exposure. The actual one is the mean over the period before it: counts that the
-encoder has moved on, in the samples of 8192 ticks that lie between. NaN where the position was set meanwhile.
+The LM629's velocity is known at each exposure. The actual one is the mean over the period before it: encoder counts per
+sample of 8192 ticks. NaN if the position was set meanwhile.
 """
 
 from __future__ import annotations
@@ -29,7 +29,10 @@ _WRAP = 1 << 32
 
 
 class WheelTrack:
-    """One wheel: speeds in m/s at the nominal radius. `told`: by the host, `profile`: of the LM629, `actual`."""
+    """One wheel: speeds in m/s at the nominal radius.
+
+    `told`: commanded by the host, `profile`: of the LM629, `actual`: measured.
+    """
 
     def __init__(self) -> None:
         self.told, self.profile, self.actual = column(), column(), column()
@@ -49,7 +52,7 @@ class WheelTrack:
 
 class PageTrack(RobotTrack):
     """One robot. `steered`: a host steers it along its reference. `fine`: the LM629's velocity at each of its samples,
-    where a recording is full.
+    if the recording is full.
     """
 
     def __init__(self, id: RobotId, steered: bool, delay_frames: int) -> None:

@@ -1,4 +1,4 @@
-"""The run of a page once more, with checks and watchers: what a recording does not hold.
+"""Repeats the run of a page with checks and watchers, for data that a recording does not contain.
 
 The first robot's processor is watched instruction by instruction; the bits of the run do not depend on it.
 """
@@ -29,9 +29,9 @@ from mirotwin.verify.steps.player import Player
 
 
 class WatchedRun(msgspec.Struct, frozen=True):
-    """`digest`: at the end of the last of `periods`; `faults`: network, slot, fault. `image` has its debug files where
-    they are; `robot`: whose processor was watched. `steps`, of a run that was driven by them: begin, end, what, whether
-    it failed. `watch`: of a board.
+    """`digest`: at the end of the last of `periods`; `faults`: network, slot, fault. `image`: with its debug files, if
+    they exist; `robot`: the one whose processor was watched. `steps`: begin, end, text, failed, for a run driven by
+    steps. `watch`: of a board.
     """
 
     result: Result
@@ -48,7 +48,7 @@ class WatchedRun(msgspec.Struct, frozen=True):
 
 
 def run_again(job: Job, until_tick: int | None, quiet: bool) -> WatchedRun:
-    """Runs it to `until_tick` (None: to its end), and on to the end of that control period. Raises BadInput."""
+    """Runs `job` to `until_tick` (None: its end), and on to the end of that control period. Raises BadInput."""
     spec = msgspec.structs.replace(job.spec, until_tick=until_tick)
     with plain_parameters(spec.origin, "replayed"):
         world = spec.world()
