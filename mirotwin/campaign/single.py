@@ -39,13 +39,13 @@ Prepared = tuple[AnyText, dict[RobotId, list[Check]], list[Step]]
 
 
 def prepared(origin: str, text: str, settings: tuple[str, ...]) -> Prepared:
-    """A scenario with its settings made, what it expects, and its steps. Raises BadInput for one that cannot be run."""
+    """A scenario with its settings applied, its checks, and its steps. Raises BadInput if it cannot be run."""
     return _prepared(origin, text, settings, tuple(installed.in_files.items()))
 
 
 @lru_cache(maxsize=64)
 def _prepared(origin: str, text: str, settings: tuple[str, ...], _brought: object) -> Prepared:
-    """`_brought`: plug-ins in files; with others the same text is another scenario."""
+    """`_brought`: plug-in files, part of the cache key: with other plug-ins the same text is another scenario."""
     spec = any_of_text(text, origin, settings)
     return spec, expectations_of(spec.scenario, origin), steps_of(spec.scenario, origin)
 
