@@ -5,16 +5,19 @@ and of files of rows.
 <!-- channels -->                                   one for each channel of a recording
 <!-- figures -->                                    the columns of a results file
 <!-- rules -->                                      the rules of `mirotwin conform`, in the folder of the documents
+<!-- readings: miro_robot.lm629.options:Lm629Options -->   fields whose docstrings begin with the name of a rule
 <!-- csv: tests/robot/ucsim/disagreements.csv -->   a file of the tree, whose cells are Markdown
 """
 
 from __future__ import annotations
 
+import ast
 import csv
 import inspect
 import re
 from collections.abc import Iterator
 from importlib import import_module
+from itertools import pairwise
 from pathlib import Path
 from typing import Any
 
@@ -26,7 +29,8 @@ from docs.site import conformance_table
 ROOT = Path(__file__).parents[2]
 
 MARK = re.compile(
-    r"^<!-- (keys: (?P<keys>[\w.]+:\w+)|channels|figures|rules|csv: (?P<csv>[\w./-]+)) -->$", re.MULTILINE
+    r"^<!-- ((?P<kind>keys|readings): (?P<struct>[\w.]+:\w+)|channels|figures|rules|csv: (?P<csv>[\w./-]+)) -->$",
+    re.MULTILINE,
 )
 
 
@@ -36,9 +40,10 @@ def filled(markdown: str) -> str:
 
 
 def _table(found: re.Match[str]) -> str:
-    if found["keys"]:
-        module, _, name = found["keys"].partition(":")
-        return "\n".join(key_sections(getattr(import_module(module), name)))
+    if found["struct"]:
+        module, _, name = found["struct"].partition(":")
+        struct = getattr(import_module(module), name)
+        return "\n".join(key_sections(struct) if found["kind"] == "keys" else reading_rows(struct))
     if found["csv"]:
         return "\n".join(csv_rows(ROOT / found["csv"]))
     if found[1] == "rules":
@@ -78,6 +83,26 @@ def key_sections(root: type) -> Iterator[str]:
             value += f" (>= {low:g}, <= {high:g})" if low is not None else ""
             yield f"| `{name}` | {value} | {default_of(field)} |"
         yield ""
+
+
+def readings(struct: type) -> Iterator[tuple[str, str, str]]:
+    """(rule, field, meaning) of the fields whose docstring is `RULE: MEANING`."""
+    (tree,) = ast.parse(inspect.getsource(struct)).body
+    assert isinstance(tree, ast.ClassDef)
+    for field, text in pairwise(tree.body):
+        if isinstance(field, ast.AnnAssign) and isinstance(text, ast.Expr):
+            assert isinstance(field.target, ast.Name)
+            assert isinstance(text.value, ast.Constant)
+            rule, _, meaning = " ".join(str(text.value.value).split()).partition(": ")
+            yield rule, field.target.id, meaning
+
+
+def reading_rows(struct: type) -> Iterator[str]:
+    fields = {field.encode_name: field for field in kinds.type_info(struct).fields}
+    yield "| rule | key | values | default | what |\n|---|---|---|---|---|"
+    for rule, name, meaning in readings(struct):
+        field = fields[name]
+        yield f"| {rule} | `{name}` | {value_of(field.type)} | {default_of(field)} | {meaning} |"
 
 
 def parts_of(key: str) -> list[type]:

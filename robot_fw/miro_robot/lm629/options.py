@@ -1,7 +1,7 @@
 """What the documents leave open, one named field per rule: the default is this twin's choice.
 
 If a measured chip behaves in the other way, set the other reading in a scenario's
-`[lm629]` table or as `Lm629Options(...)`. README.md in this folder explains each rule.
+`[lm629]` table or as `Lm629Options(...)`. README.md in this folder says where rules come from.
 Page numbers are those of the data sheet SNVS781C.
 """
 
@@ -30,22 +30,23 @@ class Lm629Options(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fie
     undue_data_flags: bool = True
     """E2: data when no word is due at all raises the command error (in the wrong direction: always)."""
     unfinished_flags: bool = True
-    """E3: a command byte before the last word of another command raises the command error."""
+    """E3: a command byte before the last word of another raises the command error; complete parameters are kept."""
     status_read_flags: bool = False
     """E4: reading the status byte while a word from the host is due raises the command error."""
     range_flags: bool = False
     """E5: a parameter out of its range raises the command error."""
     out_of_range: Literal["masked", "clamped"] = "masked"
-    """W1: such a parameter keeps its low bits, or becomes the nearest that fits (relative ones: always masked)."""
+    """W1: such a parameter keeps its low bits (velocity, acceleration 30, position 31, others 15), or becomes the
+    nearest that fits (relative ones: always masked)."""
 
     # Interrupts
     interrupt: Literal["level", "event"] = "level"
-    """I1: HI follows (flags AND mask), or is latched by flags that rise."""
+    """I1: HI follows (flags AND mask), or is latched by flags that rise and cleared by any RSTI."""
     error_flag_repeats: bool = True
     """I2: the excessive-error flag comes back each sample that the error persists; False: once per excess."""
     reset_interrupts: bool = True
-    """I3: the flag that a reset raises (trajectory complete) also raises HI; False has a meaning with `event` alone."""
-
+    """I3: the flag that a reset raises (trajectory complete) also raises HI: signals 8184h, else 0184h; False has a
+    meaning with `event` alone."""
     hi_falls: Literal["busy", "latch"] = "busy"
     """I4: HI falls when the RSTI or MSKI that ends it is no longer busy, or when its last byte is latched."""
 
@@ -55,16 +56,16 @@ class Lm629Options(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fie
     software_reset_busy: bool = True
     """R2: the status byte is 01h while a RESET command runs; False: 00h."""
     reset_breakpoint: Literal["none", "fires", "stays"] = "none"
-    """R3: no breakpoint after a reset (84h); one at 0, which fires in the first sample (C4h); or its flag is set (C4h),
-    and the first RSTI leaves it (C0h)."""
+    """R3: no breakpoint after a reset (84h); one at 0, which fires in the first sample (C4h, then 80h); or its flag is
+    set (C4h), and the first RSTI leaves it (C0h)."""
     reset_restarts_samples: bool = True
-    """R4: samples count from the end of the reset; False: they go on in the grid of tick 0."""
+    """R4: samples and PWM count from the end of the reset; False: they go on in the grid of tick 0."""
     reset_clears_lpes: bool = True
     """R5: a RESET command ends "stop on excessive error"."""
     reset_clears_index: bool = True
     """R6: a reset clears the index register and a SIP that is pending; False: both stay."""
     reset_pulse_clocks: int = 8
-    """R7: a shorter low on /RST leaves the chip stuck at status 00h."""
+    """R7: a shorter low on /RST, or none at power-up, leaves the chip stuck at status 00h."""
 
     # Start and stop
     start_takes: Literal["given", "sample"] = "given"
@@ -108,17 +109,17 @@ class Lm629Options(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fie
     open_loop_clears: bool = True
     """F3: a motor that is off forgets sum, error history and derivative."""
     update_clears: bool = False
-    """F4: UDF forgets them too."""
+    """F4: UDF forgets them too; it always restarts the derivative interval."""
     error_test: Literal["full", "saturated"] = "full"
     """F5: the error threshold is compared with the whole error, or with its 16 bits."""
 
     # Output
     output_rounding: Literal["down", "zero"] = "down"
-    """O1: which way a negative drive is rounded to sign and magnitude."""
+    """O1: which way a negative drive is rounded to sign and magnitude (16 bits shifted by 8, at most 127)."""
     sign_of_negative: Literal[1, 0] = 1
     """O2: level of the sign pin for negative torque."""
     pulse_at: Literal["start", "end"] = "start"
-    """O3: where in its period the PWM pulse is."""
+    """O3: where in its period the PWM pulse, 4 clocks a step, is."""
     off_keeps_sign: bool = False
     """O4: a motor that is switched off keeps the level of its sign pin; False: 0."""
     port12_clears: bool = True

@@ -1,11 +1,13 @@
 """Every rule that was chosen can be read the other way, and then the chip does otherwise."""
 
+import re
 from operator import attrgetter
 from pathlib import Path
 
 import msgspec
 import pytest
 
+from docs.site import tables
 from miro_robot.lm629.chip import Lm629
 from miro_robot.lm629.options import CHOICES, LENGTHS, Lm629Options
 from tests.robot.lm629.bench import Bench
@@ -13,6 +15,7 @@ from tests.states import restore, snapshot, values
 
 MOTOR_OFF, BREAKPOINT, EXCESS, COMPLETE, ERROR = 0x80, 0x40, 0x20, 0x04, 0x02
 ACQUIRE_INDEX = 0x0001
+MARK = "<!-- readings: miro_robot.lm629.options:Lm629Options -->"
 README = Path(__file__).parents[3] / "robot_fw/miro_robot/lm629/README.md"
 
 
@@ -190,7 +193,14 @@ def test_the_other_reading_of_a_rule_does_otherwise(field, other, steps, what, b
 def test_every_option_is_observed_and_documented():
     fields = set(Lm629Options.__struct_fields__)
     assert {field for field, *_ in READINGS} == fields
-    assert {field for field in fields if f"`{field}`" not in README.read_text()} == set()
+    documented = list(tables.readings(Lm629Options))
+    assert [field for _, field, _ in documented] == list(Lm629Options.__struct_fields__)
+    rules = [rule for rule, _, _ in documented]
+    assert all(re.fullmatch("[A-Z][0-9]+", rule) for rule in rules)
+    assert len(set(rules)) == len(rules)
+    assert all(len(meaning) > 20 for _, _, meaning in documented)
+    assert MARK in README.read_text()
+    assert all(f"| {rule} | `{field}` |" in tables.filled(MARK) for rule, field, _ in documented)
     assert {name for name, *_ in LENGTHS} | set(CHOICES) == fields
 
 
