@@ -1,4 +1,4 @@
-"""`mirotwin info`: what is installed, which engine runs, and which firmware."""
+"""`mirotwin info`: installed versions, the engine, and the firmware."""
 
 import importlib
 import platform
@@ -23,7 +23,7 @@ PLAIN_REMEDY = "rebuild with GCC or Clang, and with the Cython of .ci/constraint
 
 
 def version_of(package: str) -> str:
-    """The installed version of a distribution, or a word that says it is not there."""
+    """The installed version of a distribution, or a word for a missing one."""
     try:
         return metadata.version(package)
     except metadata.PackageNotFoundError:
@@ -72,9 +72,8 @@ def _engine_line(active: str) -> str:
 
 
 def _broken_modules(active: str) -> list[str]:
-    """Imports every hot module: what cannot be loaded (a stale one, say) shows here and not in a run.
-
-    Uncompiled, what has no `.py` is not used and cannot be imported.
+    """Imports every hot module, so that one that cannot be loaded (a stale one, for example) is reported here and not
+    in a run. In Python mode, modules without a `.py` file are skipped: they are unused and cannot be imported.
     """
     problems = []
     for name, source in engines.install().sources.items():

@@ -1,4 +1,4 @@
-"""JSON of what holds paths: a file's name may have bytes that are no UTF-8, and JSON has none of them."""
+"""JSON of data with paths: the bytes of a file's name may be no UTF-8, which JSON cannot express."""
 
 from typing import Any
 

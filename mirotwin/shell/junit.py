@@ -1,4 +1,4 @@
-"""JUnit XML: what continuous integration shows of tests, as pytest writes it. XML has no control characters."""
+"""JUnit XML for continuous integration, in the form that pytest writes. XML has no control characters."""
 
 from __future__ import annotations
 
@@ -16,9 +16,9 @@ from mirotwin.shell.verdicts import VERDICTS, Kind, Verdict
 
 
 class TestCase(msgspec.Struct, frozen=True):
-    """One test, rule, run or crash. `counts`: whether its verdict does; one that does not is skipped in JUnit. `lines`:
-    all there is to say; the first one is the message. `time_s` None: nothing about times, so the same verdicts give the
-    same bytes. `facts`: what else there is to know, by names of docs/formats/results.md.
+    """One test, rule, run or crash. `counts`: the verdict affects the exit code; otherwise the case is "skipped" in
+    JUnit. `lines`: the report; the first line is the message. `time_s` None: nothing about times, so the same verdicts
+    give the same bytes. `facts`: further properties, by the names in docs/formats/results.md.
     """
 
     __test__ = False
@@ -102,7 +102,7 @@ class ReadCase(msgspec.Struct, frozen=True):
 
     @property
     def place(self) -> str:
-        """FILE:LINE, or what of it is known."""
+        """FILE:LINE, or the known part of it."""
         return ":".join(self.facts[name] for name in ("file", "line") if self.facts.get(name))
 
 

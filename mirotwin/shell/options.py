@@ -1,4 +1,4 @@
-"""Options that several commands share, each declared once, and what is loaded because of them."""
+"""Options that several commands share, each declared once, and the loading of their values."""
 
 from __future__ import annotations
 
@@ -98,7 +98,7 @@ NAME = PathType()
 """A path as text."""
 PATH = PathType(path_type=Path)
 IMAGE = "Firmware image"
-"""The heading of options that say which image runs and how it is read."""
+"""Heading of options that select the image and how it is read."""
 
 
 SEED = Option("--seed", type=Whole(0, MAX_SEED), help="Master seed of all noise.")
@@ -162,7 +162,7 @@ def refuse_steps(scenario: Scenario | BoardScenario, origin: str) -> None:
 
 @contextmanager
 def plain_parameters(label: str, done: str = "run") -> Iterator[None]:
-    """Within it, numbers with which nothing can be computed and parts that fail are bad input.
+    """Within this block, numbers that cannot be computed with, and failing parts, become bad input.
 
     `label` names the file that they came from.
     """

@@ -1,7 +1,7 @@
-"""The folder or file a command writes to: refused if other things are there, filled in one go at the end.
+"""The output folder or file of a command: refused if it has other content, completed in one step at the end.
 
-Everything is written under another name beside its place first (run.part.mcap, FILE.xxxx.part), so that whatever goes
-wrong leaves either the files from before or the new ones, never half of one.
+Everything is written under another name beside its place first (run.part.mcap, FILE.xxxx.part), so an error leaves
+either the earlier files or the new ones, never half of one.
 """
 
 from __future__ import annotations
@@ -18,7 +18,7 @@ from miro_exact.bad_input import BadInput
 
 RECORDING = "run.mcap"
 FILES = (RECORDING, "figure.svg", "summary.json")
-"""What a run writes; `--force` replaces these, and the parts of them that a run broken off has left."""
+"""Files that a run writes; `--force` replaces these, and the parts of them left by an interrupted run."""
 KEPT = (RECORDING, "summary.json")
 """Of these, a run that is broken off leaves the parts."""
 FULL = (errno.ENOSPC, errno.EDQUOT, errno.EFBIG)
@@ -26,20 +26,20 @@ FULL = (errno.ENOSPC, errno.EDQUOT, errno.EFBIG)
 
 
 class OutputError(BadInput):
-    """A folder that cannot be written to: `path`, what, remedy."""
+    """A path that cannot be written to: `path`, reason, remedy."""
 
     def __init__(self, path: Path, reason: str, remedy: str) -> None:
         super().__init__(path, "", reason, remedy)
 
 
 def part_name(name: str) -> str:
-    """What a file is called until it is whole: run.part.mcap for run.mcap."""
+    """Name of a file until it is complete: run.part.mcap for run.mcap."""
     path = Path(name)
     return f"{path.stem}.part{path.suffix}"
 
 
 RECORDINGS = (RECORDING, part_name(RECORDING))
-"""What a run's folder has one of."""
+"""A run's folder contains one of these."""
 
 
 def file_in(path: str, names: Sequence[str] = RECORDINGS) -> str:
@@ -51,13 +51,14 @@ def file_in(path: str, names: Sequence[str] = RECORDINGS) -> str:
 class OutputFolder:
     """`path` as the target of a command that writes files called `names`, by default those of a run.
 
-    Checks at once; as a context manager locks the folder, and `part` says where to write each file. Leaving the context
-    normally gives the parts their names, and removes files of these names that were not written again. Leaving it by an
-    exception removes the parts, but for those named in `keep`, and leaves complete files as they were. A process that
-    is killed leaves all its parts. Raises OutputError for a folder with other content (unless `force`), for one that
-    another process writes to, for one that cannot be made, and for a full disk.
+    It is checked at once. As a context manager it locks the folder; `part` returns the path for each file. At a normal
+    end the parts get their final names, and files of these names that were not written again are removed. After an
+    exception the parts are removed, except those named in `keep`, and complete files stay unchanged. A killed process
+    leaves all its parts.
 
-    `ours`: the folder is the command's own choice; a finished run that stands there is replaced as by `force`.
+    Raises OutputError for a folder with other content (unless `force`), for one that another process writes to, for one
+    that cannot be created, and for a full disk. `ours`: the command chose the folder itself; a finished run in it is
+    replaced as with `force`.
     """
 
     def __init__(
@@ -76,7 +77,7 @@ class OutputFolder:
         _check(path, force, names, ours)
 
     def part(self, name: str) -> Path:
-        """Where to write the file that is to be called `name`."""
+        """Path for writing the file `name` until it is complete."""
         return self.path / part_name(name)
 
     def __enter__(self) -> OutputFolder:
@@ -154,7 +155,7 @@ def locked_folder(path: Path) -> Iterator[None]:
 
 
 def entries(path: Path, option: str) -> list[str]:
-    """What a folder to be written to holds; nothing where it is not there yet. Raises OutputError for any other."""
+    """The entries of an output folder; empty if it does not exist. Raises OutputError if `path` is no folder."""
     remedy = f"choose another folder with {option}"
     try:
         present = sorted(os.listdir(path))
@@ -237,9 +238,10 @@ def check_new(path: Path, option: str, force: bool, *inputs: str | Path | None, 
 
 @contextmanager
 def whole_file(path: Path, option: str) -> Iterator[Path]:
-    """A name beside `path` to write to; what was written takes its place at the end, or is gone if anything raised.
+    """Yields a path beside `path` to write to. At the end the written file replaces `path`; after an exception it is
+    removed.
 
-    A link stays one, and a file keeps its mode. Raises OutputError, before anything is done, where `check_file` does,
+    A link stays a link, and a file keeps its mode. Raises OutputError, before anything is done, if `check_file` does,
     and for a full disk.
     """
     check_file(path, option)
@@ -304,15 +306,16 @@ def _staging(target: Path) -> Path:
 
 
 def told_when_full(path: Path | None, option: str, kind: str = "folder") -> AbstractContextManager[None]:
-    """A full disk becomes an OutputError that names the folder, or file. It occurs on write, where the OSError names
-    none. `path`: None where nothing is written.
+    """Converts a full disk's OSError, which names no file, to an OutputError that names the folder or file.
+
+    `path`: None if nothing is written.
     """
     return nullcontext() if path is None else refused(path, f"choose another {kind} with {option}", FULL)
 
 
 @contextmanager
 def refused(path: Path, remedy: str, only: Collection[int] = ()) -> Iterator[None]:
-    """What the system does not allow, or of that `only` these values of errno, becomes an OutputError of the path."""
+    """Converts an OSError, or only those with an errno in `only`, to an OutputError of the path."""
     try:
         yield
     except OSError as error:

@@ -1,4 +1,4 @@
-"""Plug-ins of one's own in files, FILE.py:CLASS on the command line: laws, estimators, references, parts of boards."""
+"""Plug-ins in your own files, FILE.py:CLASS on the command line: laws, estimators, references, parts of boards."""
 
 from __future__ import annotations
 
@@ -50,9 +50,9 @@ class PluginFiles(Options, frozen=True, kw_only=True):
     parts: Parts = ()
 
     def bring(self, prefix: str = "--") -> None:
-        """Runs the files; scenarios and boards can name what is in them until this is called again. Raises BadInput.
+        """Runs the files; scenarios and boards can name their plug-ins until the next call.
 
-        `prefix`: begins the names of the options.
+        Raises BadInput. `prefix`: of the options' names in messages.
         """
         for registry in (LAWS, ESTIMATORS, REFERENCES, PARTS):
             _bring(registry, getattr(self, f"{registry.word}s"), f"{prefix}{registry.word}")

@@ -1,6 +1,6 @@
 """Pools of processes that work for this one: they have its engine, ignore Ctrl-C, and end when it does.
 
-Nothing here imports a hot module: a new process reads this file before its engine is chosen.
+This module imports no hot module: a new process imports it before its engine is chosen.
 """
 
 from __future__ import annotations
@@ -19,10 +19,10 @@ from mirotwin.shell.processes import cores, safe_path
 
 
 def start_pool(count: int, context: BaseContext) -> tuple[ProcessPoolExecutor, list[Future[int]]]:
-    """A pool whose processes have been started, and a job for each of them that is done once it works.
+    """A pool with started processes, and a job for each of them that is done when it is ready.
 
-    Ctrl-C goes to all processes of a terminal; the first one tells the others to end. They ignore it from their first
-    instruction on: what a process ignores, those that it starts ignore too.
+    Ctrl-C goes to all processes of a terminal; only the first one handles it and ends the others. They ignore it from
+    their first instruction on, because a process inherits ignored signals.
     """
     with _ignoring_interrupts(), safe_path():
         pool = ProcessPoolExecutor(count, context, initializer=_begin, initargs=(engine.active(),))
@@ -31,7 +31,7 @@ def start_pool(count: int, context: BaseContext) -> tuple[ProcessPoolExecutor, l
 
 @contextmanager
 def spare_process() -> Iterator[Executor | None]:
-    """A process that begins as a copy of this one, so that it has loaded everything; None where no core is free for it.
+    """A process that starts as a copy of this one, with everything loaded; None without a free core.
 
     A process with threads is not copied: their locks would stay locked.
     """

@@ -1,4 +1,4 @@
-"""Processes of ours: how a module runs in one, on how many cores, and what they must not import or outlive."""
+"""Our child processes: starting a module in one, the number of cores, import safety, and their end with the parent."""
 
 from __future__ import annotations
 
@@ -23,7 +23,7 @@ def cores() -> int:
 
 @contextmanager
 def safe_path() -> Iterator[None]:
-    """Processes that begin meanwhile do not import from the current folder, whatever starts them."""
+    """Child processes started within this block do not import from the current folder."""
     before = os.environ.get(_SAFE_PATH)
     os.environ[_SAFE_PATH] = "1"
     try:
@@ -41,6 +41,9 @@ _library = ctypes.CDLL(None) if sys.platform == "linux" else None
 
 
 def end_with_parent(signal: int) -> None:
-    """Has this process get `signal` when its parent ends. Without effect where there is no such thing."""
+    """Lets the system send `signal` to this process when its parent ends.
+
+    No effect on systems without this function.
+    """
     if _library is not None:
         _library.prctl(_SET_PARENT_DEATH_SIGNAL, signal, 0, 0, 0)

@@ -1,5 +1,5 @@
-"""How the command line fails: one line on stderr and an exit code, never a traceback for bad input. An unexpected
-error is one line too, which requests a report; with MIROTWIN_TRACEBACK=1 in the environment the traceback
+"""Error handling of the command line: one line on stderr and an exit code, never a traceback for bad input. An
+unexpected error is one line too, which requests a report; with MIROTWIN_TRACEBACK=1 in the environment the traceback
 comes before it.
 """
 
@@ -34,7 +34,7 @@ from mirotwin.shell.verdicts import (
 
 
 def traceback_text(error: BaseException) -> str:
-    """It, if it is wanted, else "". For plug-ins: an error that nothing caused has no more to say."""
+    """The traceback if it is requested, else "". For plug-ins. An error without a cause has no traceback."""
     wanted = error.__cause__ is not None and os.environ.get("MIROTWIN_TRACEBACK")
     return "".join(traceback.format_exception(error)) if wanted else ""
 
@@ -46,7 +46,7 @@ def show_traceback(error: BaseException) -> None:
 
 
 class Terminated(BaseException):
-    """SIGTERM or SIGHUP: raised where the program stands, so that it cleans up as after Ctrl-C."""
+    """SIGTERM or SIGHUP: raised in the running code, so that it cleans up as after Ctrl-C."""
 
     def __init__(self, number: int) -> None:
         self.number = number
@@ -58,25 +58,25 @@ class ReaderGone(Exception):
 
 
 def complain(*messages: str) -> None:
-    """One line each on stderr, whatever the messages hold."""
+    """Prints one line each on stderr; control characters in messages are escaped."""
     for message in messages:
         click.echo(f"mirotwin: {one_line(message)}", err=True)
 
 
 def tell_notes(notes: Iterable[str]) -> None:
-    """What the settings of a scenario left out, on stderr."""
+    """Prints the notes about left-out settings of a scenario on stderr."""
     complain(*(f"note: {note}" for note in notes))
 
 
 def report_lines(reported: Iterable[tuple[str, str]]) -> int:
-    """Says on stderr what speaks for which verdict; returns the exit code of all together."""
+    """Prints (verdict, text) lines on stderr; returns the exit code of all together."""
     lines = list(reported)
     complain(*(text for _, text in lines))
     return exit_code(*(verdict for verdict, _ in lines))
 
 
 def show_line(text: str) -> None:
-    """One line on stdout, whatever the text holds: names in files of others may hold codes that a terminal obeys."""
+    """Prints one line on stdout; control codes in the text, for example from names in others' files, are escaped."""
     click.echo(one_line(text.expandtabs()))
 
 
@@ -90,7 +90,7 @@ def _report(error: Exception) -> str:
 
 
 def _in_words(error: click.UsageError) -> str:
-    """What is wrong, in the house's words where an option's name is."""
+    """The error message in our words, if it is about an option's name."""
     if not isinstance(error, click.NoSuchOption) or error.ctx is None:
         return error.format_message()
     names = [name for parameter in error.ctx.command.get_params(error.ctx) for name in parameter.opts]
@@ -125,7 +125,7 @@ def _terminate(number: int, frame: FrameType | None) -> NoReturn:
 
 
 def _give_up(stream: TextIO) -> None:
-    """What is still buffered has nowhere to go; without this the interpreter tries again when it ends."""
+    """Discards buffered output that cannot be written; otherwise the interpreter tries again at its end."""
     try:
         os.dup2(os.open(os.devnull, os.O_WRONLY), stream.fileno())
     except (OSError, ValueError):  # not a real file: nothing will be tried
@@ -133,7 +133,7 @@ def _give_up(stream: TextIO) -> None:
 
 
 def _ended(code: int, message: str) -> int:
-    """The exit code, after the line that says why; where stderr is full or its reader has gone, the code alone."""
+    """Prints the line with the reason and returns the exit code; only the code if stderr is full or closed."""
     try:
         complain(message)
     except OSError:
@@ -154,8 +154,9 @@ Sections = Mapping[str, Mapping[str, "Lazy | click.Group"]]
 class LazyGroup(click.Group):
     """Commands whose modules are loaded when they are used.
 
-    `sections`: heading -> name of a command -> its module and what `--help` says of it, or a group. The command is the
-    function of that name in the module. `settle_engine` runs before: such modules import at their heads what they need.
+    `sections`: heading -> name of a command -> its module and its `--help` line, or a group. The command is the
+    function of that name in the module. `settle_engine` runs before the module is loaded, because modules import hot
+    modules at their heads.
     """
 
     def __init__(self, *args: Any, sections: Sections | None = None, **named: Any) -> None:
@@ -201,9 +202,9 @@ def _about(command: Lazy | click.Group) -> str:
 
 
 def settle_engine(arguments: Sequence[str]) -> None:
-    """Fixes the engine that the arguments name, before the command's module imports anything hot.
+    """Fixes the engine named by the arguments, before the command's module imports hot modules.
 
-    A word that is no engine, or one that cannot be had, is left to the command, which refuses it.
+    An invalid or unavailable engine is left to the command, which refuses it.
     """
     words = list(arguments)
     named = [word.partition("=")[2] for word in words if word.startswith("--engine=")]
@@ -214,7 +215,7 @@ def settle_engine(arguments: Sequence[str]) -> None:
 
 
 class MainGroup(LazyGroup):
-    """The group behind `mirotwin`: runs a command and turns what went wrong into a line and an exit code."""
+    """The group behind `mirotwin`: runs a command and converts errors to a line and an exit code."""
 
     def main(  # type: ignore[override]
         self, args: Sequence[str] | None = None, prog_name: str | None = None, **extra: Any
@@ -223,8 +224,8 @@ class MainGroup(LazyGroup):
         sys.exit(self._run(args, prog_name or "mirotwin", extra))
 
     def invoke(self, ctx: click.Context) -> Any:
-        """The library would make 1 of a reader that has gone, which here means that an expectation failed, and of a
-        file that ends too soon (a module's bytecode that was cut short) the Ctrl-D of a user.
+        """Replaces click's handling, which exits with 1 if a reader has gone (1 means a failed expectation here), and
+        takes a file that ends too early (a truncated bytecode file) for the user's Ctrl-D.
         """
         try:
             return super().invoke(ctx)

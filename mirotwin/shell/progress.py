@@ -1,6 +1,6 @@
 """A progress bar on stderr for work of more than a second, shown only on a terminal.
 
-This is one of the few places that know the wall clock.
+This module is one of the few that use the wall clock.
 """
 
 from __future__ import annotations
@@ -18,7 +18,7 @@ if TYPE_CHECKING:
 class ProgressBar:
     """`bar.to(done)` out of `total`. Draws nothing in the first second, nor when stderr is no terminal or closed.
 
-    `unit`: what is counted ("runs"), where the rate is shown, too; the rate and the time left are those from `begun`.
+    `unit`: the counted items ("runs"); if given, the rate is shown, too. Rate and remaining time count from `begun`.
     """
 
     PATIENCE_S = 1.0
@@ -41,7 +41,7 @@ class ProgressBar:
             self._progress.stop()
 
     def to(self, done: float, said: str = "") -> None:
-        """Moves the bar. Cheap enough to call once a control period. `said`: the text of a column that shows one."""
+        """Moves the bar to `done`; cheap enough to call every control period. `said`: text of the bar's text column."""
         if not self._shown:
             return
         if self._progress is None:
@@ -65,7 +65,7 @@ class ProgressBar:
         return [words, BarColumn(), TaskProgressColumn(), rate if self.unit else TimeRemainingColumn()]
 
     def _rate(self, done: float) -> str:
-        """How fast it goes since `begun`, and how long the rest takes at that rate."""
+        """The rate since `begun`, and the remaining time at that rate."""
         passed_s = time.monotonic() - self._began_s
         per_s = (done - self.begun) / passed_s
         if self.total is None or per_s <= 0.0:

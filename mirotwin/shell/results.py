@@ -1,4 +1,4 @@
-"""What a command came to, for programs: one record, as JUnit XML and as JSON (docs/formats/results.md)."""
+"""The results of a command, for programs: one record, as JUnit XML and as JSON (docs/formats/results.md)."""
 
 from __future__ import annotations
 

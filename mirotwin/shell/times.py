@@ -48,7 +48,7 @@ class TimeType(Word):
 def window(
     from_time: Time | None, to_time: Time | None, crystal_hz: int = TICKS_PER_SECOND
 ) -> tuple[int, int | None]:
-    """The ticks that --from and --to ask for; None: to the end. Raises BadInput where there are none between."""
+    """First and last tick of --from and --to; None: to the end. Raises BadInput for an empty window."""
     from_tick = 0 if from_time is None else from_time.ticks(crystal_hz)
     to_tick = None if to_time is None else to_time.ticks(crystal_hz)
     if to_tick is not None and to_tick <= from_tick:

@@ -1,6 +1,6 @@
 """The one table of verdicts: their order, their exit codes, and the words for people, JUnit and pages.
 
-docs/exit-codes.md, which is written from it (`python -m docs.site.exit_codes`), says when each of them is given.
+docs/exit-codes.md, written from it by `python -m docs.site.exit_codes`, describes when each is given.
 """
 
 from __future__ import annotations
@@ -35,21 +35,21 @@ VERDICTS: dict[Verdict, VerdictFormat] = {
     "passed": VerdictFormat(0, "passed", "passed", "passed", "passed"),
     "not observable": VerdictFormat(5, "not observable", "not observable", "not observable", "skipped"),
 }
-"""In the order of precedence: what cannot be observed changes nothing where anything was judged."""
+"""Sorted by precedence. "not observable" comes last: it changes nothing if anything was judged."""
 
 DONE, BAD_INPUT = VERDICTS["passed"].code, VERDICTS["error"].code
 INTERNAL_ERROR = 70
 """EX_SOFTWARE of sysexits.h."""
 SIGNALLED = 128
-"""Plus the number of the signal: what a shell reports for a program that a signal ended."""
+"""Plus the number of the signal: exit code that a shell reports for a program ended by a signal."""
 SIGHUP, SIGINT, SIGPIPE, SIGTERM = 1, 2, 13, 15
 INTERRUPTED = SIGNALLED + SIGINT
 
 
 def judge(verdicts: Iterable[str], unnamed: Iterable[str] = ()) -> Verdict:
-    """The verdict of all together; that of nothing is that it passed.
+    """The verdict of all together; "passed" if there is none.
 
-    `unnamed`: of checks that nobody requested. One that had no occasion counts as one that cannot be observed.
+    `unnamed`: of checks that the user did not name; one that never applied counts as not observable.
     """
     reported = {*verdicts, *("not observable" if unseen == "not judged" else unseen for unseen in unnamed)}
     return next((verdict for verdict in VERDICTS if verdict in reported), "passed")

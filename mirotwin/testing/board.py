@@ -1,4 +1,4 @@
-"""The board and serial fixtures: what a test does to a board, waits for and reads; a terminal at its serial port."""
+"""The board and serial fixtures: actions, waits and readings of a test, and a terminal at the serial port."""
 
 from __future__ import annotations
 
@@ -27,7 +27,9 @@ _PORTS = (0x80, 0x90, 0xA0, 0xB0)
 
 
 def ticks_of(world: World, within: int | None, within_ms: float | None) -> int | None:
-    """How long a wait lasts: `within_ms`, or `within` as `mirotwin.ms` gives it, in ticks of 24 MHz of any board."""
+    """Length of a wait in ticks of 24 MHz (for any board): from `within_ms`, or from `within` as `mirotwin.ms` gives
+    it.
+    """
     if within_ms is not None:
         return ms_ticks(within_ms, world.clock)
     return None if within is None else own_ticks(world, within)
@@ -57,7 +59,7 @@ class BoardUnderTest(DeviceUnderTest):
 
     @shown_where_it_was_called
     def value(self, path: str) -> float | int | bool | str:
-        """A value of a part as it is now."""
+        """The present value of a part."""
         return self._device.value(path)
 
     @shown_where_it_was_called
@@ -96,8 +98,8 @@ class BoardUnderTest(DeviceUnderTest):
         within_ms: float | None = None,
         **fields: Any,
     ) -> Event:
-        """Runs on to the first event that fits, as the step `wait_for` has it: `wait_for("pulse", pin="P1.2",
-        at_least_us=1400, within_ms=50)`. Raises WaitFailed with what was there instead.
+        """Runs to the first event that fits, with the fields of the step `wait_for`: `wait_for("pulse", pin="P1.2",
+        at_least_us=1400, within_ms=50)`. Raises WaitFailed with the events that occurred instead.
         """
         condition = condition_of(event, fields)
         ticks = ticks_of(self.world, within, within_ms)
@@ -105,12 +107,15 @@ class BoardUnderTest(DeviceUnderTest):
 
     @shown_where_it_was_called
     def never(self, event: str | Condition, for_ms: float, **fields: Any) -> None:
-        """Lets so much time pass. Raises WaitFailed where something happens that fits."""
+        """Runs for `for_ms`. Raises WaitFailed if an event occurs that fits."""
         self._never(condition := condition_of(event, fields), for_ms, f"no {condition}")
 
     @shown_where_it_was_called
     def hold(self, event: str | Condition, for_ms: float, **fields: Any) -> None:
-        """Lets so much time pass. Raises WaitFailed where it is not so: `hold("value", 5, of="a.b", equals=1)`."""
+        """Runs for `for_ms`.
+
+        Raises WaitFailed if the condition is not true all the time: `hold("value", 5, of="a.b", equals=1)`.
+        """
         condition = condition_of(event, fields)
         if not isinstance(condition, Followed) or not condition.LASTS:
             raise BadInput("", "board.hold", f"{condition.what} is not for a time", "use level, duty, value")
@@ -159,7 +164,7 @@ class SerialUnderTest:
 
     @shown_where_it_was_called
     def write(self, data: bytes | str, gap_ms: float = 0.0) -> int:
-        """Sends characters, a text in UTF-8, after what is being sent; no time passes. Returns the number of bytes.
+        """Sends characters (a text as UTF-8) after those already queued; no time passes. Returns the number of bytes.
 
         At the rate of the board's file, or of its receiver, which has to be on then.
         """
@@ -182,8 +187,8 @@ class SerialUnderTest:
         within: int | None = None,
         within_ms: float | None = None,
     ) -> re.Match[bytes]:
-        """Waits until the board has sent this text, or what matches the pattern, and returns the match; what stood
-        before it is taken, too. What was sent before this call and is not taken counts. Raises WaitFailed.
+        """Waits until the board has sent this text, or text that matches the pattern, and returns the match. The match
+        and all text before it are consumed. Text sent before this call and not yet consumed counts. Raises WaitFailed.
         """
         plain = text.decode("utf-8", "backslashreplace") if isinstance(text, bytes) else text
         condition = Text(text=plain, pattern=pattern)
@@ -218,7 +223,7 @@ class SerialUnderTest:
 
     @shown_where_it_was_called
     def read(self) -> bytes:
-        """All that the board has sent and that is not taken yet; no time passes."""
+        """Everything that the board has sent and that is not yet consumed; no time passes."""
         self._gather()
         data = bytes(event.value for event in self._characters)
         self._characters.clear()

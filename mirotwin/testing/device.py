@@ -1,4 +1,4 @@
-"""What robot and board fixtures share: the memory of a processor, breakpoints, reset and supply."""
+"""The common base of robot and board fixtures: memory of a processor, breakpoints, reset and supply."""
 
 from __future__ import annotations
 
@@ -22,8 +22,9 @@ UP_TICKS = ms(267)
 
 
 class DeviceUnderTest:
-    """The device in `slot` of `network`. `written`: whether the test has changed its memory by itself; `proofs`: that
-    the faults of the test changed something.
+    """The device in `slot` of `network`.
+
+    `written`: the test has written to its memory; `proofs`: that the faults of the test changed something.
     """
 
     def __init__(self, world: World, network: int, slot: int) -> None:
@@ -37,14 +38,14 @@ class DeviceUnderTest:
 
     @property
     def faults(self) -> list[FirmwareFault]:
-        """What the firmware did that it must not."""
+        """The firmware faults so far."""
         return list(self._device.board.faults)
 
     @shown_where_it_was_called
     def read(self, name: str, as_type: str = "") -> Any:
         """The firmware's variable `name` by its C type: `read("last_left")`, `read("motion:state")`, `read("body[3]")`,
         `read("pt.x")`. An array is a list, a struct a dict. `as_type`, `int16` or `uint8[4]`, is for images without
-        .cdb. Raises BadInput with the names that come close.
+        .cdb. Raises BadInput with similar names.
         """
         return read_value(self._device.board.cpu, self.world.image, name, as_type)
 
@@ -74,15 +75,18 @@ class DeviceUnderTest:
 
     @shown_where_it_was_called
     def reset(self, for_ticks: int = RESET_TICKS) -> None:
-        """Holds the processor in reset for so long, and lets it go; `wait_until_up` is for what comes then."""
+        """Holds the processor in reset for `for_ticks`, then releases it.
+
+        Use `wait_until_up` to wait for the firmware.
+        """
         self.world.run_to(self.world.set_reset(1, self.network, self.slot))
         self.world.run_for(for_ticks)
         self.world.run_to(self.world.set_reset(0, self.network, self.slot))
 
     @shown_where_it_was_called
     def fault(self, hardware: str) -> None:
-        """Breaks hardware, or mends it: "encoder left lost", as `fault` of steps. A test in which it changes nothing is
-        not judged, and fails. Raises ValueError for what is no fault.
+        """Breaks or repairs hardware: "encoder left lost", as in the `fault` of steps. A test in which the fault
+        changes nothing is not judged, and fails. Raises ValueError for an unknown fault.
         """
         fault = Fault(self.world.earliest_action_tick, self.network, self.slot, fault_text(hardware))
         Proof.begin(self.proofs, self.world, f"fault {hardware}", fault)
@@ -93,7 +97,7 @@ class DeviceUnderTest:
         self.world.run_to(self.world.set_power(0, self.network, self.slot))
 
     def power_on(self) -> None:
-        """Switches it on again; it begins from reset."""
+        """Switches the supply on again; the device starts from reset."""
         self.world.run_to(self.world.set_power(1, self.network, self.slot))
 
     @shown_where_it_was_called

@@ -36,7 +36,7 @@ if TYPE_CHECKING:
     AnyRig = Rig | PortRig
 
 OWN = ("miro_", "mirotwin")
-"""What our modules' names begin with."""
+"""Prefixes of our modules' names."""
 RIG = pytest.StashKey["AnyRig"]()
 REPORTED = (ValueError, TimeoutError, NotObservable, AttributeError)
 """Errors of a test that are shown otherwise than they were raised."""
@@ -44,7 +44,7 @@ OF_A_TWIN = {*dir(World), *World.STATE, *World.NOT_STATE}
 
 
 def rig_for(item: pytest.Item, seed: int) -> AnyRig:
-    """The rig of a test; what its marker asks for and cannot have is an error of one line."""
+    """The rig of a test; a request of its marker that cannot be fulfilled is an error of one line."""
     desk = desk_of(item.config)
     try:
         firmware = path_option(item.config, "firmware")
@@ -77,8 +77,9 @@ def judge(item: pytest.Item) -> None:
 
 
 def as_the_test_sees_it(item: pytest.Item, error: BaseException) -> BaseException:
-    """The error without the frames of the machine below the test's own line, and a wait in words; a test that needs
-    what no port shows is skipped.
+    """The error without our frames below the test's own line, and a failed wait in words.
+
+    A test that needs something a port cannot show is skipped.
     """
     machine = item.stash[RIG].machine
     if isinstance(error, AttributeError):
@@ -101,7 +102,7 @@ def as_the_test_sees_it(item: pytest.Item, error: BaseException) -> BaseExceptio
 def tell(
     item: pytest.Item, report: pytest.TestReport, caught: pytest.ExceptionInfo[BaseException] | None
 ) -> None:
-    """Puts into a test's report what names its run, and where it failed the story; leaves its folder."""
+    """Adds the run's facts and, for a failure, the story to a test's report; writes its folder."""
     rig, seed = item.stash[RIG], item.stash[RIG].spec.seed
     if report.failed:
         with suppress(BadInput):
@@ -158,7 +159,7 @@ def _note(item: pytest.Item, report: pytest.TestReport, facts: dict[str, str | i
 
 
 def let_go(item: pytest.Item) -> None:
-    """The test is over: pytest keeps its items to the end of the session, worlds need not live as long."""
+    """Releases the test's world: pytest holds its items to the end of the session, but worlds may be freed earlier."""
     if RIG in item.stash:
         del item.stash[RIG]
 
@@ -199,7 +200,9 @@ def _failed_at(
     caught: pytest.ExceptionInfo[BaseException] | None,
     result: Result,
 ) -> list[str]:
-    """The assertion that failed and its place; of what `judge` says, what is in no line of the result."""
+    """The failed assertion with its place; of a failure found by `judge`, the parts that no line of the result
+    contains.
+    """
     error = None if caught is None else caught.value
     if isinstance(error, pytest.fail.Exception) and not error.pytrace:
         return [line for line in f"{error}".splitlines() if line not in result.lines]
@@ -211,7 +214,7 @@ def _failed_at(
 
 
 def story(rig: AnyRig, result: Result, failed_at: Sequence[str], lines: Sequence[str]) -> str:
-    """The section of a report: what ran, what failed where, the last events, and `lines` to reproduce it."""
+    """The section of a report: the run, the failure with its place, the last events, and `lines` to reproduce it."""
     text = [
         *rig.head(),
         *failed_at,

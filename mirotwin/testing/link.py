@@ -1,7 +1,7 @@
-"""The link fixture: a host at the radio that sends what a test says, and waits for answers in virtual time.
+"""The link fixture: a host at the radio that sends the test's frames, and waits for answers in virtual time.
 
-Each answer is taken once: those that a wait does not ask for stay for the next one. The link reads along by itself, so
-that a wait for something else (`world`, `robot`) takes nothing away from it.
+Each answer is consumed once; answers that a wait does not want stay for the next one. The link reads independently, so
+a wait for something else (`world`, `robot`) takes no answers from it.
 """
 
 from __future__ import annotations
@@ -40,7 +40,7 @@ class SentFrame(msgspec.Struct, frozen=True):
 
 
 class Link(FrameSender):
-    """The host's end of `network`. Sequence numbers count by themselves; `velocities` are those that were sent last."""
+    """The host's end of `network`. Sequence numbers count automatically; `velocities`: those sent last."""
 
     def __init__(self, machine: Machine, network: int = 0) -> None:
         super().__init__(machine, network, -1)
@@ -70,7 +70,8 @@ class Link(FrameSender):
         to the end of the last character; without `wait`, virtual time stands still and the next frame queues.
 
         `ask`: robot (seq mod N) answers. `seq`: instead of the next number; a frame brings its own. `bad_stop`: indices
-        of characters whose stop bit is bad. `at_tick`: of the first start bit. ValueError for what cannot be sent.
+        of characters whose stop bit is bad. `at_tick`: of the first start bit. Raises ValueError for content that
+        cannot be sent.
         """
         number: int | None = None
         if isinstance(frame, bytes | bytearray):
@@ -114,7 +115,7 @@ class Link(FrameSender):
             self.machine.run_to(min(begun + CONTROL_PERIOD_TICKS, end_tick))
 
     def ping(self, slot: int = 0) -> SentFrame:
-        """A service frame that changes nothing."""
+        """Sends a service frame without an effect."""
         return self.send(ServiceFrame.ping(self.next_seq(), slot))
 
     def set_acceleration(self, slot: int, value: int) -> SentFrame:
@@ -135,9 +136,9 @@ class Link(FrameSender):
     def expect(
         self, wanted: type[TelemetryFrame] = TelemetryFrame, *, within: int, **fields: int
     ) -> TelemetryFrame:
-        """Waits for an answer whose `fields` are these and returns it; one that has come already and was not taken
-        counts too. `within`: ticks from now, `ms(40)`. Raises WaitFailed with what came instead, BadInput for a field
-        that telemetry does not have.
+        """Waits for an answer with these `fields` and returns it; an answer received earlier and not consumed counts,
+        too. `within`: ticks from now, `ms(40)`. Raises WaitFailed with the answers received instead, BadInput for a
+        field that telemetry does not have.
         """
         if wanted is not TelemetryFrame:
             raise BadInput(
@@ -160,7 +161,7 @@ class Link(FrameSender):
 
     @shown_where_it_was_called
     def expect_bytes(self, pattern: bytes, *, within: int) -> int:
-        """Waits until the PC has received `pattern`, and returns the tick; what stood before it is taken too."""
+        """Waits until the PC has received `pattern`, and returns the tick; the characters up to it are consumed."""
 
         def taken() -> int | None:
             place = bytes(event.value for event in self._characters).find(pattern)
@@ -182,7 +183,7 @@ class Link(FrameSender):
         wanted: str,
         judged: bool = True,
     ) -> T:
-        """What `taken` gives now, or after an event of this condition. Raises WaitFailed when the time is over."""
+        """The result of `taken` now, or after an event of this condition. Raises WaitFailed after `within` ticks."""
         begun_tick, remaining = self.machine.tick, within
         events: list[Event] = []
         while True:
@@ -197,7 +198,7 @@ class Link(FrameSender):
 
     @shown_where_it_was_called
     def expect_silence(self, for_ticks: int) -> None:
-        """Lets so much time pass. Raises WaitFailed at the first character that the PC hears meanwhile."""
+        """Runs for `for_ticks`. Raises WaitFailed at the first character that the PC receives."""
         begun_tick = self.machine.tick
         end_tick = begun_tick + for_ticks
         expected = f"silence for {for_ticks / TICKS_PER_MS:g} ms"

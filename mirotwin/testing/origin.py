@@ -1,4 +1,4 @@
-"""Where a project gets Mirotwin from, as a line of its requirements: an address or a path, never a mere name.
+"""The source of Mirotwin in a project's requirements: an address or a path, never just a name.
 
 No package index has Mirotwin: pip would install whatever a stranger registers under the name.
 """
@@ -18,13 +18,13 @@ from miro_exact.bad_input import BadInput, shortened
 
 PACKAGE = "mirotwin[report]"
 UNKNOWN = re.compile(r"^Write here where .*$", re.MULTILINE)
-"""The line of the sample project that stands for it. No requirement: pip fails, and prints the line."""
+"""The placeholder line in the sample project for an unknown source. It is no requirement: pip fails, and prints it."""
 PLACEHOLDER = "https://HOST/PATH"
 """Stands for the address of the repository, also in `[project.urls]` until that is set (`docs/site/address.py`)."""
 _ADDRESS = re.compile(r"(?:(?:git|hg|svn|bzr)\+\w+|https?)://[!-~]+")
 _REMEDY = f"give git+{PLACEHOLDER}@COMMIT, or the path of a wheel, a source archive or a checkout"
 _PLAIN = re.compile(r"[\w+-][\w./+-]*", re.ASCII)
-"""A path that pip reads as it stands: without spaces, brackets and the like, and not the project's folder itself."""
+"""A path that pip reads without quoting: no spaces or brackets, and not the project's folder itself."""
 _ARCHIVES = (".whl", ".tar.gz", ".zip")
 
 
@@ -34,7 +34,7 @@ class _Version(msgspec.Struct):
 
 
 class _DirectUrl(msgspec.Struct):
-    """`direct_url.json` (PEP 610), which pip leaves for what it did not install from an index."""
+    """`direct_url.json` (PEP 610), which pip writes for an installation that is not from an index."""
 
     url: str
     vcs_info: _Version | None = None
@@ -56,7 +56,7 @@ def given(source: str, project: Path) -> str:
 
 
 def installed(project: Path) -> str | None:
-    """The requirement for what is installed here; None where that is not known, or there no more."""
+    """The requirement for the installed Mirotwin; None if its source is unknown or no longer exists."""
     try:
         distribution = metadata.distribution("mirotwin")
         text = distribution.read_text("direct_url.json")

@@ -1,4 +1,4 @@
-"""What one test works with at a port: the robots there, which get a stop command when it is over."""
+"""The rig of one test at a port: the robots there, which get a stop command at its end."""
 
 from __future__ import annotations
 
@@ -40,7 +40,7 @@ class PortRig:
         pytest.skip(f"robot: not observable {LACKS['inside']}")
 
     def close(self) -> None:
-        """From now on the robots stand."""
+        """Stops the robots; nothing is sent afterwards."""
         self.tick = self.machine.tick if self.tick < 0 else self.tick
         self.opened.close()
 
@@ -55,7 +55,7 @@ class PortRig:
         return Result(verdict="passed", said=reported, tick=self.tick)
 
     def located(self, caught: BaseException | None, result: Result) -> Result:
-        """No port shows which C line a robot executes."""
+        """The result unchanged: a port does not show which C line a robot executes."""
         return result
 
     def head(self) -> list[str]:
@@ -65,5 +65,5 @@ class PortRig:
         return last_events(self.machine, self.tick)
 
     def left(self, caught: BaseException | None, where: str) -> Left:
-        """The recording, which `replay` compares with what a twin does."""
+        """The recording; `replay` compares it with a twin's run."""
         return {RECORDING: self.recording.getvalue()}, [command_line("replay", operand(where))]

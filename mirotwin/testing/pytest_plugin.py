@@ -1,4 +1,4 @@
-"""pytest plugin: a world for each test, and which lines of the firmware a session ran.
+"""pytest plugin: a world for each test, and firmware line coverage of a session.
 
     def test_a_poll_is_answered(link, robot):
         link.poll(slot=0)
@@ -6,7 +6,7 @@
 
     pytest --mirotwin-firmware=mine.ihx --mirotwin-seed=7 --firmware-coverage=fw.info
 
-Sessions that use none of it import nothing else of ours.
+Sessions that do not use it import no other module of ours.
 """
 
 from __future__ import annotations
@@ -163,7 +163,7 @@ def serial(mirotwin_rig: Rig | PortRig) -> SerialUnderTest:
 
 @pytest.hookimpl(wrapper=True)
 def pytest_runtest_call(item: pytest.Item) -> Generator[None, Any, Any]:
-    """The checks judge a test that has come to its end."""
+    """Judges a completed test by the checks."""
     if _RIG not in getattr(item, "funcargs", ()):
         return (yield)
     from mirotwin.testing import items

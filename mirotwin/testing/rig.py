@@ -1,4 +1,4 @@
-"""What one test works with: its world, links and robots, the checks that judge it, and its story when it fails."""
+"""The rig of one test: its world, links and robots, the checks that judge it, and the report of a failure."""
 
 from __future__ import annotations
 
@@ -57,7 +57,7 @@ class Rig:
         """Nothing of a world has to be closed."""
 
     def judge(self) -> Result:
-        """What came of the test's run, which is over; lets a control period end first.
+        """The result of the test's completed run; ends the control period first.
 
         Raises BadInput for a check that breaks.
         """
@@ -69,11 +69,11 @@ class Rig:
         return self.result()
 
     def result(self) -> Result:
-        """The result as far as it is known."""
+        """The result so far."""
         return self.run.result()
 
     def head(self) -> list[str]:
-        """What ran, a line each."""
+        """Facts about the run, a line each."""
         image, world = self.world.image, self.world
         return [
             f"scenario {world.scenario.name}, seed {world.seed}, {at(self.tick, world.clock)}",
@@ -82,11 +82,11 @@ class Rig:
         ]
 
     def last_events(self) -> list[str]:
-        """The last things that happened up to the end of the test, a line each."""
+        """The last events up to the end of the test, a line each."""
         return last_events(self.world, self.tick)
 
     def left(self, caught: BaseException | None, where: str) -> Left:
-        """The case, where a check can judge what failed; nothing if the test wrote into a robot's memory by itself.
+        """The case, if a check can judge the failure; nothing if the test wrote into a robot's memory.
 
         `where`: the folder as commands name it.
         """
@@ -99,11 +99,11 @@ class Rig:
 
     @property
     def written(self) -> bool:
-        """True if the test wrote into a memory by itself: then nobody can run it again."""
+        """True if the test wrote into a memory: then its run cannot be repeated from a file."""
         return any(device.written for device in (*self.robots, *filter(None, [self.board])))
 
     def located(self, caught: BaseException | None, result: Result) -> Result:
-        """The result with the C line at which the debugger stands at the check, or the wait, that failed."""
+        """The result with the C line at which the failed check or wait stopped the device."""
         if isinstance(caught, WaitFailed):
             result = msgspec.structs.replace(result, step_tick=self.tick)
         return result if self.written else located(self.run, result)
@@ -121,7 +121,7 @@ class Rig:
 
 
 def last_events(machine: Machine, end_tick: int) -> list[str]:
-    """What happened last up to `end_tick` (-1: now), a line each."""
+    """The last events up to `end_tick` (-1: now), a line each."""
     logs: list[HostLog | BoardLog] = [line.log for line in machine.lines]
     logs += [device.log for device in machine.devices]
     end_tick = machine.tick if end_tick < 0 else end_tick
@@ -133,13 +133,13 @@ def last_events(machine: Machine, end_tick: int) -> list[str]:
 
 
 def run_for(options: RigOptions) -> Run:
-    """A new world, what goes into it, and the checks of all that happens in it.
+    """A new world with a trace of its input, and its checks.
 
-    Its robots are up, and only the first world of its kind waits for the firmware. A robot is up when its serial
-    receiver is on (REN in SCON) at the end of a control period: that asks nothing of the firmware but what a robot on a
-    radio has to do, and leaves it the rest of the period for what comes after.
+    Its robots have booted; only the first world of its kind waits for the firmware. A robot has booted when its serial
+    receiver is on (REN in SCON) at the end of a control period: every robot on a radio must do this, and the rest of
+    the period remains for further initialisation.
 
-    Raises BadInput where the firmware does not come up.
+    Raises BadInput if the firmware does not boot.
     """
     spec = options.spec
     world = spec.world()

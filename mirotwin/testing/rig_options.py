@@ -1,12 +1,12 @@
-"""What a test wants: its scenario, firmware, seed and expectations, from its marker and from the session's options.
+"""The options of a test: scenario, firmware, seed and expectations, from its marker and from the session's options.
 
     @pytest.mark.mirotwin(scenario="fig6", settings=["duration_s=2"], seed=7, firmware="mine.ihx",
                           expect={"settles_within_s": 2.0}, boot=False)
     @pytest.mark.mirotwin(board="car.board.toml", firmware="car.hex")      a board, from power-on
 
 A key of the marker holds for its test, one of the innermost marker before others; `settings` and `expect` of all
-markers add up. Options hold for the tests that do not say; a seed from the command line holds for all, because that is
-how the printed line repeats a test.
+markers add up. Session options hold for tests without a key of their own; a seed from the command line holds for all
+tests, because the printed command repeats a test by it.
 """
 
 from __future__ import annotations
@@ -35,7 +35,7 @@ MARKER = "@pytest.mark.mirotwin"
 
 
 class RigOptions(msgspec.Struct, frozen=True):
-    """The run of a test. `boot`: it begins when the firmware is up, not at power-on."""
+    """Options of a test's run. `boot`: the test begins after the firmware's start, not at power-on."""
 
     spec: RunSpec
     boot: bool
@@ -85,10 +85,10 @@ def _check_key(key: str, value: Any) -> None:
 def rig_options(
     marks: Iterable[pytest.Mark], folder: Path, firmware: str | Path | None, seed: int
 ) -> RigOptions:
-    """What the markers of a test, the innermost one first, and the session ask for.
+    """The options from a test's markers, innermost first, and from the session.
 
-    `folder`: that of the test, from which the markers' paths go; `firmware`: the session's, None for the robot's own.
-    Raises BadInput.
+    `folder`: of the test, to which the markers' paths are relative; `firmware`: the session's, None for the robot's
+    own. Raises BadInput.
     """
     if not 0 <= seed <= MAX_SEED:
         raise BadInput("", "seed", f"{seed} is out of range", f"give 0 to {MAX_SEED}")

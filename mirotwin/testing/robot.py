@@ -1,4 +1,4 @@
-"""The robot fixture: what a robot does at its wheels, and what stands in its memory."""
+"""The robot fixture: motion of a robot's wheels, and content of its memory."""
 
 from __future__ import annotations
 
@@ -18,8 +18,8 @@ Mode = Literal["drive", "stop", "off"]
 
 
 class WheelState(msgspec.Struct, frozen=True):
-    """One wheel now. `mode`: the command of its LM629; `commanded`: the velocity, in 1/256 count per sample as a
-    team frame has it, 0 unless it drives; `speed_m_s`: of the rim, in truth; `pwm`: duty in 1/128, negative backward;
+    """The present state of a wheel. `mode`: the command of its LM629; `commanded`: velocity in 1/256 count per sample
+    as in a team frame, 0 unless it drives; `speed_m_s`: true speed of the rim; `pwm`: duty in 1/128, negative backward;
     `position`: counts of the LM629 as of its last sample.
     """
 
@@ -62,7 +62,7 @@ class RobotUnderTest(DeviceUnderTest):
 
     @property
     def wheels(self) -> WheelStates:
-        """What the wheels do now, and what was commanded."""
+        """The present motion and commands of the wheels."""
         board, chassis = self._robot.board, self._robot.spec.drive.chassis
         left, right = Wheels(track_m=chassis.track_m).split(*self._robot.drive.velocity_at(self.world.tick))
         return WheelStates(_wheel(board.left, left), _wheel(board.right, right))

@@ -17,7 +17,7 @@ from mirotwin.testing.test_options import TestOptions
 
 
 class ScenarioFailed(Exception):
-    """What is wrong, in lines: no traceback of ours helps."""
+    """A failed scenario file, with the report in lines: our traceback would not help."""
 
 
 class ScenarioFile(pytest.File):

@@ -29,7 +29,7 @@ TABLE_COLUMNS = 160
 
 
 class FirmwareCoverage:
-    """Of one session. On the controller of pytest-xdist it adds up what its workers counted."""
+    """Firmware coverage of one session. The controller of pytest-xdist adds up its workers' counts."""
 
     def __init__(self, config: pytest.Config) -> None:
         self.config = config
@@ -47,7 +47,7 @@ class FirmwareCoverage:
         on_load.set(self.watch)
 
     def watch(self, cpu: Cpu) -> None:
-        """Counts what `cpu` does from now on, if it was the image that it got."""
+        """Counts the instructions of `cpu` from now on, if it runs the session's image."""
         inspector = cpu.inspector
         watched = isinstance(inspector, Inspector) and self.counters in inspector.watchers
         if not watched and cpu.code == self.image.code:

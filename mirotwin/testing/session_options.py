@@ -52,7 +52,7 @@ _OPTIONS: tuple[tuple[str, str, type, str], ...] = (
     ("--firmware-sources", "DIR", list, "where its C files are"),
     ("--firmware-coverage-fail-under", "PERCENT", float, "fail when fewer of the lines ran"),
 )
-"""Name, what stands for its value in the help, type (bool: a switch; list: may be repeated), help."""
+"""Name, placeholder of its value in the help, type (bool: a switch; list: may be repeated), help."""
 
 
 FILES_OF = ("part", "law", "estimator")
@@ -60,7 +60,7 @@ FILES_OF = ("part", "law", "estimator")
 
 
 def add_options(parser: pytest.Parser) -> None:
-    """Makes them known to pytest."""
+    """Registers the options with pytest."""
     group = parser.getgroup("mirotwin", "worlds for tests, firmware coverage (mirotwin)")
     for name, metavar, kind, help_text in _OPTIONS:
         if kind is bool:
@@ -74,7 +74,7 @@ def add_options(parser: pytest.Parser) -> None:
 
 
 def check_options(config: pytest.Config) -> None:
-    """Raises UsageError for what cannot be meant."""
+    """Raises UsageError for an impossible combination."""
     if config.getoption("--mirotwin-port") == "":
         raise pytest.UsageError("--mirotwin-port: is empty; name the port of the robots, or leave it out")
     if number_option(config, "repeat", 1) < 1:
@@ -118,7 +118,7 @@ def check_options(config: pytest.Config) -> None:
 
 
 def number_option(config: pytest.Config, name: str, default: int) -> int:
-    """An option, else what the ini file says."""
+    """The value of an option, else of the ini file, else `default`."""
     given = config.getoption(f"--mirotwin-{name}")
     if given is not None:
         return int(given)
@@ -148,7 +148,7 @@ def first_seed(item: pytest.Item) -> int:
 
 
 def desk_of(config: pytest.Config) -> DeskOptions:
-    """What the command line says of a port."""
+    """The port options of the command line."""
     from mirotwin.desk.guard import DeskOptions  # loads the command line's machinery
 
     given = {name: config.getoption(f"mirotwin_{name}", None) for name in DeskOptions.__struct_fields__}

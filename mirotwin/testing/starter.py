@@ -1,4 +1,4 @@
-"""What a user begins with: `mirotwin examples` and `mirotwin init` write the files of the pages, and a project."""
+"""Files for new users: `mirotwin examples` and `mirotwin init` write the documentation's files, and a project."""
 
 from __future__ import annotations
 
@@ -30,15 +30,15 @@ EXAMPLES = {
     "foxglove": "A layout for Foxglove.",
     "vscode": "The extension for VS Code, ready to install: debugs firmware.",
 }
-"""Name, and what `mirotwin examples` says of it."""
+"""Name -> description in `mirotwin examples`."""
 PROJECT, BOARDS = "hil", "boards"
-"""The folder that `mirotwin init` writes, and the one whose folders it writes with --board."""
+"""The folder that `mirotwin init` writes, and the folder of the boards for --board."""
 _DEBUG_FILES = {"mine": (".map", ".cdb", ".rst"), "late": (".map", ".cdb")}
 """The two images differ in one byte, a constant, so names and lines are the same; .rst holds the bytes, too."""
 
 
 def folder() -> Path:
-    """Where the examples are. Raises BadInput in an installation without them."""
+    """The folder of the examples. Raises BadInput in an installation without them."""
     for place in (_IN_WHEEL, _IN_TREE):
         if place.is_dir():
             return place
@@ -66,7 +66,7 @@ EXTENSION, VSIX = "vscode", "mirotwin-debug.vsix"
 
 
 def contents_of(name: str) -> dict[str, bytes]:
-    """What is written of an example, by name. Raises BadInput as `example_files` does."""
+    """Path -> content of the files of an example. Raises BadInput as `example_files` does."""
     files = {example: path.read_bytes() for example, path in example_files(name)}
     if name != EXTENSION:
         return files
@@ -85,9 +85,9 @@ def _images() -> Iterator[tuple[str, Path]]:
 FIRMWARE = "firmware"
 REQUIREMENTS, README = "requirements.txt", "README.md"
 OF_CI = (".git", "ci.sh", "Dockerfile", REQUIREMENTS)
-"""How the names of those files of the project begin that a project of a board has, too."""
+"""Beginnings of names of the project's files that a board's project has, too."""
 OF_FIRMWARE = "tests/test_firmware.py"
-"""What only this firmware passes, because it names a function of it."""
+"""A test that only the sample firmware passes, because it names one of its functions."""
 
 
 def project_files(firmware: bool = True) -> Iterator[tuple[str, Path]]:
@@ -119,11 +119,11 @@ def board_files(board: str) -> Iterator[tuple[str, Path]]:
 
 
 _LEFT_BEHIND = {"build", "runs", "__pycache__", ".pytest_cache", ".venv", "GNUmakefile"}
-"""What tools leave, and the firmware's make file of a checkout, which writes outside of its folder."""
+"""Files and folders that tools create, and a checkout's firmware make file, which writes outside of its folder."""
 
 
 def all_files(folder: Path) -> Iterator[Path]:
-    """Regular files, but for what tools leave behind."""
+    """Regular files, without those that tools created."""
     for path in sorted(folder.rglob("*")):
         parts = path.relative_to(folder).parts
         left_behind = any(part in _LEFT_BEHIND or part.endswith(".egg-info") for part in parts)
@@ -222,8 +222,8 @@ def init(options: InitOptions) -> None:
     test.
 
     requirements.txt says where CI gets Mirotwin: SOURCE, else the git commit, wheel or checkout that the installed one
-    came from; one in the project, or beside it, by its relative path; a release from an index by its tag. Where none is
-    known, it says what to write there, and CI fails with that.
+    came from; one in the project, or beside it, by its relative path; a release from an index by its tag. If none is
+    known, it contains a line about what to write there, and CI fails with this line.
     """
     folder, remedy = options.folder, "name a folder that is new or empty"
     sources = board_files(options.board) if options.board else project_files(not options.without_firmware)

@@ -1,4 +1,4 @@
-"""`mirotwin summary`: what JUnit files say, as a short page in Markdown, and as annotations of GitHub."""
+"""`mirotwin summary`: JUnit files as a short page in Markdown, and as annotations of GitHub."""
 
 from __future__ import annotations
 
@@ -34,12 +34,13 @@ class SummaryOptions(Options, frozen=True, kw_only=True):
 
 @command_of(SummaryOptions)
 def summary(options: SummaryOptions) -> int:
-    """Makes a page in Markdown of JUnit files, or of those in DIR: of `test`, `conform`, `fuzz`, `run` and pytest.
+    """Makes a page in Markdown from JUnit files, or from those in DIR, written by `test`, `conform`, `fuzz`, `run` and
+    pytest.
 
-    It has a line for each file, and for each failure what was wrong, when, where, and the commands that play it again.
+    It has a line for each file, and for each failure the message, time, place, and the commands that replay it.
 
-    Nothing is judged: whatever failed, the exit code is 0. Exit code 2: there is no JUnit file, or no test in one, so
-    nothing was tested.
+    Nothing is judged: the exit code is 0 even after failures. Exit code 2: there is no JUnit file, or no test in one,
+    so nothing was tested.
     """
     files = [file for path in options.paths for file in _files(path)]
     reports = {file: cases for file in files if (cases := read_junit(file))}
@@ -114,7 +115,7 @@ def _table(head: Sequence[str], rows: Iterable[Sequence[str]]) -> Iterator[str]:
 
 
 def _plain(text: str) -> str:
-    """The text, in which nothing is Markdown or HTML."""
+    """The text with escaped Markdown and HTML."""
     text = text if len(text) <= _LONGEST else f"{text[:_LONGEST]} .."
     return _MARKDOWN.sub(r"\\\g<0>", text)
 
@@ -140,7 +141,7 @@ def annotation(case: ReadCase) -> str:
 
 
 def _escaped(text: str, more: str = "") -> str:
-    """As GitHub's toolkit escapes a message, and in a property `:` and `,` too."""
+    """Escapes a message as GitHub's toolkit does; `more`: further characters, in a property `:` and `,`."""
     return "".join(
         f"%{ord(character):02X}" if character in f"%\r\n{more}" else character for character in text
     )

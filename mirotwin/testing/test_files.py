@@ -1,8 +1,8 @@
-"""Scenario files and cases as tests: each to its result.
+"""Runs scenario files and cases as tests.
 
-A case passes where the check that failed passes, as it should on firmware that was mended. Where it had no occasion to
-judge, the case is not judged: firmware that does nothing at all has mended nothing. A stream that expects nothing is
-judged by the checks that are always on.
+A case passes if its failed check passes now, as it should on repaired firmware. If the check never applied, the case is
+not judged: firmware that does nothing at all has repaired nothing. A stream without expectations is judged by the
+always-on checks.
 """
 
 from __future__ import annotations
@@ -30,7 +30,9 @@ from mirotwin.verify.expectations import as_settings, in_files
 def run_sanitized(
     options: TestOptions, file: str, allowed: Sequence[Allowed]
 ) -> tuple[Result, list[Allowed], list[str]]:
-    """The result with what the sanitizer found, what is allowed and was found, and what it cannot observe."""
+    """The result with the sanitizer's findings, the allowed entries that were used, and notes on images that it cannot
+    observe.
+    """
     with sanitized() as watching:
         result = run_file(options, file)
         found, stale = judged(watching.take(), allowed, options.sanitizer.kinds)
@@ -82,7 +84,7 @@ def _run_case(options: TestOptions, path: str) -> Result:
 
 
 def _as_test(path: str, result: Result) -> Result:
-    """What a case comes to as a test: where its check passes, it passes, whichever firmware it is of."""
+    """The result of a case as a test: it passes if its check passes, on any firmware."""
     if result.verdict in ("passed", "differs"):
         notes: list[Line] = [("passed", text) for text in result.texts[1:]]
         return replace(result, path=path, verdict="passed", said=notes)

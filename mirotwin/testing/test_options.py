@@ -54,7 +54,9 @@ class TestOptions(Options, frozen=True, kw_only=True):
     quiet: Annotated[bool, QUIET.saying("No line for a file that passed.")] = False
 
     def debug_line_for(self, file: str, finding: Finding | None = None) -> str:
-        """The command that stands at the failed step of this scenario, or at a finding; "" where it cannot."""
+        """The command that opens the debugger at the failed step of this scenario, or at a finding; "" if there is
+        none.
+        """
         if self.desk.port or self.expected or (finding is None and not file.endswith(".toml")):
             return ""
         run: dict[str, Any] = {"seed": self.seed or None, "settings": self.settings}

@@ -1,7 +1,7 @@
-"""An extension for VS Code as the file that `code --install-extension` takes: the same bytes wherever it is made.
+"""Builds the VS Code extension file for `code --install-extension`, with reproducible bytes.
 
-A .vsix is a zip: what the types of its files are, a manifest for the marketplace, and the extension in a folder. The
-manifest says what package.json says.
+A .vsix is a zip with the types of its files, a manifest for the marketplace, and the extension in a folder. The
+manifest has the data of package.json.
 """
 
 from __future__ import annotations

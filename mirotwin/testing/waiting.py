@@ -1,4 +1,4 @@
-"""A wait of a test that failed, in words: what was awaited, since when, and what happened meanwhile."""
+"""Describes a failed wait of a test: the awaited event, the begin of the wait, and the events meanwhile."""
 
 from __future__ import annotations
 
@@ -28,8 +28,9 @@ NETWORK_SIZES = (3, 5)
 
 
 class WaitFailed(AssertionError):
-    """What a test waited for did not come, or what should not come did. `expect`: the check that says the same, as in
-    `[expect]`; None where no check can.
+    """An awaited event did not come, or a forbidden one came.
+
+    `expect`: the equivalent check, as in `[expect]`; None if there is none.
     """
 
     def __init__(
@@ -61,10 +62,10 @@ class WaitFailed(AssertionError):
         before: Sequence[Event] = (),
         judged: bool = True,
     ) -> WaitFailed:
-        """In words, a wait of the world that ran out. `what`: that did not come, else the conditions themselves.
+        """Describes an expired wait of the world. `reason`: the missing event, default: the conditions themselves.
 
-        `begun_tick`: where it began, if it went on several times; `before`: the events until the last one. `judged`:
-        a check can say the same.
+        `begun_tick`: begin of a wait that was continued several times; `before`: the events up to its last part.
+        `judged`: an equivalent check exists.
         """
         begun_tick = expired.begun_tick if begun_tick is None else begun_tick
         reason = reason or f"no {' or '.join(map(str, expired.conditions))}"
@@ -90,7 +91,9 @@ def why_ended(machine: Machine) -> str:
 
 
 def in_words(events: Sequence[Event], machine: Machine | None = None) -> list[str]:
-    """One line each; the characters of a frame are the frame, others that follow each other on one wire are one."""
+    """One line each; the characters of a frame are shown as the frame, other consecutive characters on one wire as one
+    line.
+    """
     if machine is not None and not machine.networks:  # a wire: the PC receives what a board sends
         events = [event for event in events if event.what != "transmitted"]
     keyed: list[tuple[object, Event]] = [
@@ -124,7 +127,7 @@ def _with_frames(events: Sequence[Event]) -> list[Event]:
 
 
 def _frame_text(event: Event) -> str:
-    """`received team seq=3 ..` of the event that a frame stands in."""
+    """`received team seq=3 ..` for the last event of a frame."""
     frame = event.frame
     assert frame is not None
     for robots in NETWORK_SIZES:
@@ -168,7 +171,7 @@ def _line(run: Sequence[Event], machine: Machine | None) -> str:
 
 
 def shown_where_it_was_called(function: Callable[P, T]) -> Callable[P, T]:
-    """For the methods of fixtures: what they raise for a test is shown at the test's own line."""
+    """Decorator for methods of fixtures: an exception for a test is shown at the test's own line."""
 
     @functools.wraps(function)
     def wrapped(*args: P.args, **kwargs: P.kwargs) -> T:

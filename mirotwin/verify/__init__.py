@@ -1,1 +1,1 @@
-"""What a run or a firmware has to fulfil: checks, steps, cases, conformance."""
+"""Verification of a run or a firmware: checks, steps, cases, conformance."""

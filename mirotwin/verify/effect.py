@@ -1,7 +1,7 @@
-"""True if a hardware fault changed anything: a twin goes on without it from the same state, and is compared.
+"""Proves that a hardware fault changed something: a twin continues without it from the same state, and is compared.
 
-Each digest holds the one before and the state at the end of a control period; armed faults are no part of it. Up to the
-fault both have the same, so their digests differ from the first period on at whose end their states do.
+Each digest includes the one before and the state at the end of a control period, without armed faults. Up to the fault
+both digests are equal; they differ from the first period on at whose end the states differ.
 """
 
 from __future__ import annotations
@@ -20,7 +20,7 @@ NO_EFFECT = "the fault changed nothing up to the end of the run"
 
 
 class Proof:
-    """Follows `world` from where `fault` is announced; `name` stands before what there is to say."""
+    """Follows `world` from the announcement of `fault`; `name` begins its messages."""
 
     def __init__(self, world: World, name: str, fault: Fault) -> None:
         self.name, self.fault = name, fault
@@ -43,9 +43,9 @@ class Proof:
             proofs.append(cls(world, name, fault))
 
     def missing(self, make: Callable[[], World]) -> str:
-        """Why nothing is known of what the robot does with this fault; "" where it changed something.
+        """Reason why the run proves nothing about this fault; "" if the fault changed something.
 
-        `make` gives a world as the one that is followed was at first.
+        `make()` returns a world in the first state of the followed one.
         """
         if self._missing is None:
             self._missing = self._look(make)
@@ -70,7 +70,7 @@ class Proof:
 
 
 def _without(known: list[T], items: list[T]) -> list[T]:
-    """The items that are not known; takes those that are out of `known`."""
+    """The items that are not in `known`; removes the others from `known`."""
     new = []
     for item in items:
         if item in known:

@@ -28,8 +28,8 @@ Expected = Annotated[tuple[str, ...], EXPECT]
 def as_settings(expected: Sequence[str], files: bool = True) -> tuple[str, ...]:
     """The values of --expect as settings of the scenario; a KEY alone is a check with its defaults.
 
-    `FILE.py:CLASS` runs the file, and makes its check known by its own name until --expect is read again. Raises
-    BadInput for what is no check, and where `files` are of no use.
+    `FILE.py:CLASS` runs the file, and registers its check by its name until --expect is read again. Raises BadInput for
+    a value that is no check, and for a file if not `files`.
     """
     named = [_IN_FILE.fullmatch(text) or text for text in expected]
     if not files and any(not isinstance(item, str) for item in named):
@@ -61,7 +61,7 @@ def checks_alone(expected: Sequence[str]) -> list[Check]:
 
 
 def in_files(expected: Sequence[str]) -> dict[str, str]:
-    """The names of checks that --expect brought from files, and what it was given for them."""
+    """Name of each check that --expect brought from a file -> the option's value."""
     given = {match[2]: text for text in expected if (match := _IN_FILE.fullmatch(text))}
     return {
         name: given[struct.__name__] for name, struct in CHECKS.in_files.items() if struct.__name__ in given
@@ -69,7 +69,7 @@ def in_files(expected: Sequence[str]) -> dict[str, str]:
 
 
 def _brought(path: str, name: str) -> str:
-    """The name of a check in a file, which is known now."""
+    """Registers a check in a file and returns its name."""
     struct = CHECKS.of_file(path, name, EXPECT.names[0])
     tag = str(struct.__struct_config__.tag)  # type: ignore[attr-defined]
     CHECKS.in_files[tag] = struct

@@ -26,7 +26,7 @@ class FrameSender:
         return (self.seq + 1) % SEQ_MODULUS
 
     def asking_seq(self, slot: int) -> int:
-        """The next number that asks the robot in `slot`. Raises ValueError where that is not fresh any more."""
+        """The next number with which robot `slot` must answer. Raises ValueError if that is not fresh any more."""
         step = asking_step(self.seq, slot, self.robots)
         if step > FRESH_STEPS:
             reason = f"no number that is fresh after {self.seq} asks robot {slot}"

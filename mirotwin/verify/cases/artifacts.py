@@ -1,8 +1,8 @@
-"""What a failure leaves in a folder of its own, in one form for pytest, `mirotwin test` and `mirotwin conform`.
+"""The folder of files for a failure, in one form for pytest, `mirotwin test` and `mirotwin conform`.
 
-report.txt        what failed, and the commands that give it again
-case.stream       what was sent and done, with the check that failed: `mirotwin replay` gives its verdict again
-sent.stream       the same without a verdict, where no check can judge the failure
+report.txt        the failure, and the commands that repeat it
+case.stream       the input with the failed check: `mirotwin replay` repeats its verdict
+sent.stream       the input without a verdict, if no check can judge the failure
 firmware.ihx      the image, with its .map, .cdb and .rst files: `replay` and `report` find it beside the stream; not
                   where it is the robot's own, which every installation has
 """
@@ -29,7 +29,7 @@ _REMEDY = "choose another folder"
 
 
 def clear(folder: Path, *others: str) -> None:
-    """Takes away what an earlier run left there, `others` too, and nothing else."""
+    """Removes files that an earlier run left there, including `others`, and nothing else."""
     for name in (*FILES, *image_files(folder), *others):
         (folder / name).unlink(missing_ok=True)
     if folder.is_dir() and not any(folder.iterdir()):
@@ -37,18 +37,18 @@ def clear(folder: Path, *others: str) -> None:
 
 
 def leave(folder: Path, report: str, files: Mapping[str, bytes]) -> None:
-    """Writes the report and these files, by name, into the folder, or nothing. Raises OSError, OutputError."""
+    """Writes the report and these files (name -> content) into the folder, all or none. Raises OSError, OutputError."""
     write_files(folder, {REPORT: encodable(report).encode(), **files}, _REMEDY)
 
 
 def stream_files(case: str | None, sent: str, image: Image) -> dict[str, bytes]:
-    """The case, or where there is none what was sent, with the image."""
+    """The case, or without a case the input as a stream, with the image."""
     name, stream = (SENT, sent) if case is None else (CASE, case)
     return {name: encodable(stream).encode(), **_image_content(image)}
 
 
 def nothing_left(folder: Path, error: OSError | BadInput) -> str:
-    """The line that says why nothing is in the folder: the verdict stands all the same."""
+    """A line with the reason why the folder is empty; the verdict is still valid."""
     if isinstance(error, OSError):
         reason = reason_of(error)
     else:
@@ -57,12 +57,12 @@ def nothing_left(folder: Path, error: OSError | BadInput) -> str:
 
 
 def image_files(folder: Path) -> list[str]:
-    """Names of the image that was left in a folder and of its debug files."""
+    """Names of the image and its debug files in such a folder."""
     return [FIRMWARE, *debug_files(folder / FIRMWARE, Path(FIRMWARE).stem)]
 
 
 def leave_image(folder: Path, image: Image) -> None:
-    """The image's own file, as long as that is what ran. Raises OSError, OutputError."""
+    """Copies the image's own file, if it still is the image that ran. Raises OSError, OutputError."""
     if files := _image_content(image):
         write_files(folder, files, _REMEDY)
 
@@ -78,7 +78,7 @@ def _image_content(image: Image) -> dict[str, bytes]:
 
 
 def image_beside(stream: str | Path, sha256: str | None) -> Path | None:
-    """The image that was left beside a stream, if it is the one with this hash."""
+    """Path of the image beside a stream, if it has this hash."""
     path = Path(stream).with_name(FIRMWARE)
     if sha256 is None or not path.is_file():
         return None
@@ -92,7 +92,7 @@ MOST_BYTES = 1 << 20
 
 
 def case_lines(folder: str, own: bool, name: str = CASE) -> tuple[str, str]:
-    """The commands that give the verdict of the case in `folder` again, and that stand at the check that failed.
+    """The commands that repeat the verdict of the case in `folder`, and that open the debugger at the failed check.
 
     `own`: with the robot's own firmware.
     """
@@ -101,5 +101,5 @@ def case_lines(folder: str, own: bool, name: str = CASE) -> tuple[str, str]:
 
 
 def report_line(folder: str) -> str:
-    """The command that makes the page of what happened, as a line of a report."""
+    """The command that makes the failure's page, as a line of a report."""
     return "page: " + command_line("report", operand(folder))

@@ -1,4 +1,4 @@
-"""A failure as one text file: what went into the world, the world itself, and the check that failed.
+"""A failure as one text file: the input of the world, the world itself, and the failed check.
 
 # mirotwin stream 2
 #: version = "0.1.0"
@@ -75,7 +75,7 @@ _WITH_HEADER = (b"# mirotwin stream 2", b"# mirotwin stream 3")
 def case_text(
     world: World, trace: Trace, expect: Mapping[str, Any], verdict: str, end_tick: int | None = None
 ) -> str:
-    """The case of `world`, which ends at `end_tick`; default: where the world is now.
+    """The case of `world` up to `end_tick`; default: the world's present tick.
 
     `expect`: the check that failed, as in `[expect]`; `verdict`: its message.
     """
@@ -102,7 +102,7 @@ def case_text(
 
 
 def _is_bare(scenario: BoardScenario) -> bool:
-    """True if it is the processor with external RAM, and nothing on it."""
+    """True for a processor with external RAM and no parts."""
     board = scenario.board
     bare = BoardSpec(
         name=board.name,
@@ -121,7 +121,7 @@ def stream_text(
     verdict: str,
     more: Mapping[str, Any],
 ) -> str:
-    """A stream file with these keys in its header: `first`, what is known of the image, the verdict, and `more`."""
+    """A stream file with these keys in its header: `first`, facts about the image, the verdict, and `more`."""
     from importlib.metadata import version  # slow to import
 
     header: dict[str, Any] = {"version": version("mirotwin"), **first}
@@ -134,14 +134,14 @@ def stream_text(
 
 
 def tables_of(scenario: Scenario) -> dict[str, Any]:
-    """A scenario as the tables of TOML, without what is expected of it."""
+    """A scenario as TOML tables, without its expectations."""
     tables = _without_none(msgspec.to_builtins(without_expectations(scenario)))
     assert isinstance(tables, dict)
     return tables
 
 
 def _without_none(value: Any) -> Any:
-    """TOML has no null: a key that is not there says the same."""
+    """The value without None entries: TOML has no null, and a missing key means the same."""
     if isinstance(value, dict):
         return {
             key: _without_none(inner) for key, inner in value.items() if inner is not None and inner != {}
@@ -163,7 +163,7 @@ def expect_of_failure(checks: Checks, failure: Failure) -> dict[str, Any]:
 
 
 def case_of_checks(world: World, trace: Trace, checks: Checks, end_tick: int | None = None) -> str:
-    """The case of the first failure of `checks`; it ends at `end_tick`, default where the world is now.
+    """The case of the first failure of `checks`; `end_tick` defaults to the world's present tick.
 
     Raises ValueError if nothing failed.
     """
@@ -179,7 +179,7 @@ def write_case(path: str | os.PathLike[str], text: str) -> None:
 
 
 def is_case(path: str | Path) -> bool:
-    """True if a stream file expects something. One that cannot be read may: who runs it says what is wrong."""
+    """True if a stream file contains an expectation. True also for an unreadable one: running it reports the error."""
     if not has_header(path):
         return False
     try:
@@ -189,7 +189,7 @@ def is_case(path: str | Path) -> bool:
 
 
 def has_header(path: str | Path) -> bool:
-    """True if a file is a stream that may say something of itself, as a case does."""
+    """True if a file is a stream with a header, as a case has."""
     if not Path(path).is_file():
         return False
     with open(path, "rb") as file:

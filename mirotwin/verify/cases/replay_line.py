@@ -1,4 +1,4 @@
-"""The commands that play a stream or a case again, and that stand at what failed in it."""
+"""The commands that replay a stream or a case, and that open the debugger at its failure."""
 
 from __future__ import annotations
 
@@ -45,7 +45,7 @@ def debug_line(
     expected: tuple[str, ...] = (),
     plugins: PluginFiles = NO_FILES,
 ) -> str:
-    """The command that stands at the failed check of a case, or at a tick of a recording, to go back from there."""
+    """The command that opens the debugger at the failed check of a case, or at a tick of a recording."""
     image, place = None if firmware is None else f"{firmware}", "" if at_tick is None else f"{at_tick}t"
     return DebugLineOptions(
         file=f"{file}", firmware=image, at=place, expected=expected, plugins=plugins

@@ -1,4 +1,4 @@
-"""Checks: what is expected of a run, as components with names."""
+"""Checks: named components for the expectations on a run."""
 
 OWN = {
     "no_fault": "mirotwin.verify.checks.faults:NoFault",
@@ -28,4 +28,4 @@ OWN = {
     "value_at_most": "mirotwin.verify.checks.signals:ValueAtMost",
     "value_at_least": "mirotwin.verify.checks.signals:ValueAtLeast",
 }
-"""Our own checks: name -> `module:class`. A room above that brings a check adds it here; this file imports nothing."""
+"""Our own checks: name -> `module:class`. A higher package adds its checks here; this file imports none of them."""

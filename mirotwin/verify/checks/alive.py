@@ -1,13 +1,13 @@
-"""The check that a robot does anything at all with frames that reach it: dead, deaf and lame robots fail every run.
+"""The check that a robot reacts at all to frames that reach it: dead, deaf and lame robots fail every run.
 
-It asks for little, so that firmware which is merely different passes: of several frames in a row that ask a wheel to
-turn at another speed than before, one is followed by an STT to that wheel; and a wheel that is asked to turn has its
-motor driven or its encoder counting. It does not go by the robot's serial port, which a dead firmware never starts:
-a frame counts if it is fresh as sent, no bit of it was turned over by the radio, and the robot is supplied and whole:
-one whose encoder is lost must not drive.
+It demands little, so that firmware which is merely different passes: of several consecutive frames that request another
+speed of a wheel, one must be followed by an STT to that wheel; and a wheel that is requested to turn must have its
+motor driven or its encoder counting. It does not use the robot's serial port, which dead firmware never starts: a frame
+counts if it is fresh as sent, the radio inverted none of its bits, and the robot is supplied and intact (a robot with a
+lost encoder must not drive).
 
-A firmware that begins again and again (a watchdog, a jump to its start) obeys frames in between. It shows in the LM629:
-they are reset a second time after they were told to turn, though nothing reset the processor.
+Firmware that restarts again and again (a watchdog, a jump to its start) obeys frames in between. The LM629s reveal it:
+they are reset a second time after an order to turn, although nothing reset the processor.
 """
 
 from __future__ import annotations
@@ -51,7 +51,7 @@ class ActsAtAll(Check, frozen=True, kw_only=True, tag="acts_at_all"):
 
 
 def frames_needed(params: Radio, characters: int) -> int:
-    """How many frames in a row a radio like this does not all lose; 0: no such number is known."""
+    """Number of consecutive frames of which a radio like this does not lose all; 0: no such number is known."""
     if abs(params.baud_offset_ppm - params.crystal_offset_ppm) > FURTHEST_PPM:
         return 0
     arrives = 1.0 - threshold(params.lost_frames) / ONE
@@ -66,8 +66,9 @@ def frames_needed(params: Radio, characters: int) -> int:
 
 
 class _Wheel:
-    """One wheel. `requested`: the speed of the last frame at the last order to it; None while that is unknown. The
-    counts: frames since that order, and since its motor was driven. `ordered`: in the last control period.
+    """One wheel. `requested`: the speed of the last frame at the last order to it; None while unknown.
+
+    The counts: frames since that order, and since its motor was driven. `ordered`: in the last control period.
     """
 
     def __init__(self) -> None:
@@ -101,10 +102,10 @@ class _Wheel:
 
 
 class AliveMonitor(Monitor[ActsAtAll]):
-    """`waiting`: (end, air before, velocities) of frames that are not counted yet.
+    """`waiting`: (end, air before, velocities) of frames not yet counted.
 
-    `counted`: frames that requested a speed; `shown`: frames to a robot that had just acted, which are not decoded:
-    that would take a tenth of the loop.
+    `counted`: frames that requested a speed; `shown`: frames to a robot that had just acted. These are not decoded,
+    which would take a tenth of the loop's time.
     """
 
     EVENTS = ("sent",)
@@ -120,7 +121,9 @@ class AliveMonitor(Monitor[ActsAtAll]):
         self.board = subject.robot.board
         self.listener = None if radio is None else radio.listeners[subject.slot]
         self.unjudged: list[tuple[int, int, bool]] = []
-        """Air, tick of the last reset, whether it is whole, at the end of each period not judged yet, in order."""
+        """At the end of each period not yet judged: air, tick of the last reset, True if the robot is intact;
+        in order.
+        """
         self.counted = self.shown = 0
         self.begun_tick = -1
         self.chip = self.board.left
@@ -189,7 +192,10 @@ class AliveMonitor(Monitor[ActsAtAll]):
             self._judge(record, tick)
 
     def _look_at_resets(self, record: RobotPeriod, now: int) -> None:
-        """In the order of time. The board may have gone on: what it has done after `now` waits for the next look."""
+        """Processes resets in the order of time.
+
+        The board may be ahead; its resets after `now` wait for the next call.
+        """
         due = [reset for reset in self.resets if reset <= now]
         del self.resets[: len(due)]
         commands = (*record.left.commands, *record.right.commands)
@@ -209,7 +215,7 @@ class AliveMonitor(Monitor[ActsAtAll]):
         return due
 
     def _judge(self, record: RobotPeriod, tick: int) -> None:
-        """Fails where a wheel has just ignored as many frames as are needed."""
+        """Fails for a wheel that has now ignored the needed number of frames."""
         wheels = (("left", self.left), ("right", self.right))
         unordered = [side for side, wheel in wheels if wheel.unordered == self.needed]
         undriven = [

@@ -1,4 +1,4 @@
-"""Checks of a robot's answers: each question to it is answered in time, and it never speaks unasked.
+"""Checks of a robot's answers: it answers each question in time, and never sends without a question.
 
 A question is a fresh frame of type 3 whose number mod N is the robot's slot (protocol/README.md, "Turns").
 """
@@ -46,7 +46,7 @@ class AnswersOnlyInTurn(Check, frozen=True, kw_only=True, tag="answers_only_in_t
 
 
 class _AnswerMonitor(Monitor[Check]):
-    """Knows questions and answers. `decoder`: of what the robot sends."""
+    """Records questions and answers. `decoder`: of the robot's characters."""
 
     EVENTS = ("frame", "transmitted")
 

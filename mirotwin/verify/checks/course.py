@@ -1,7 +1,7 @@
-"""Checks of where a robot is: near its reference, settled in time, on the pitch.
+"""Checks of a robot's position: near its reference, settled in time, on the pitch.
 
-They look once a control period, at its start, as the summary does. A failure is noted where the robot begins to be
-wrong.
+They sample once a control period, at its start, like the summary. A failure is reported at the tick at which the robot
+begins to violate the check.
 """
 
 from __future__ import annotations
@@ -103,7 +103,7 @@ class InsidePitch(CourseCheck, frozen=True, kw_only=True, tag="inside_pitch"):
 
 
 class CourseMonitor(Monitor[CourseCheck]):
-    """Notes when the robot begins to be wrong."""
+    """Records the begin of each violation."""
 
     LATER = True
 

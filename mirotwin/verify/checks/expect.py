@@ -1,4 +1,4 @@
-"""What a scenario expects: its `[expect]` tables as checks, for each robot.
+"""Converts a scenario's `[expect]` tables to checks for each robot.
 
 [expect]                                 for all robots
 inside_pitch = true                      a check with its defaults
@@ -55,7 +55,7 @@ def struct_of(name: str) -> type[Check]:
 
 
 def expectations_of(scenario: Scenario | BoardScenario, origin: str) -> dict[RobotId, list[Check]]:
-    """The checks of each robot, those that are always on first. Raises ScenarioError with the path of what is wrong."""
+    """The checks of each robot, always-on ones first. Raises ScenarioError with the path of the wrong key."""
     for_all = checks_of_table(scenario, origin, "expect", scenario.expect)
     if isinstance(scenario, BoardScenario):
         wanted = {ALONE_ALWAYS_ON: struct_of(ALONE_ALWAYS_ON)(), **for_all}
@@ -89,7 +89,7 @@ def named_in(scenario: Scenario | BoardScenario) -> set[str]:
 
 
 def says_anything(scenario: Scenario | BoardScenario) -> bool:
-    """True if a scenario expects more than what every run has to fulfil."""
+    """True if a scenario has expectations besides the always-on checks."""
     if isinstance(scenario, BoardScenario):
         return bool(scenario.expect)
     return bool(
@@ -181,7 +181,7 @@ def _required(struct: type[Check]) -> list[str]:
 
 
 def _takes_a_table(struct: type[Check], name: str) -> tuple[str, str]:
-    """What, and the remedy: the table with all that it needs, and the words that may stand there."""
+    """Reason and remedy: the table with all required keys, and its possible keys."""
     keys = ", ".join(f"{key} = {EXAMPLE_VALUES.get(key, '..')}" for key in _required(struct))
     remedy = f"write {name} = {{ {keys} }}"
     info = cast(msgspec.inspect.StructType, msgspec.inspect.type_info(struct))

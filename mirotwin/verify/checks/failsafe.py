@@ -62,10 +62,10 @@ class MotorsOff(SilenceCheck, frozen=True, kw_only=True, tag="motors_off_ms"):
 
 
 class SilenceMonitor(OrdersMonitor[SilenceCheck]):
-    """`in_time`: a wheel received its order in time. A wheel that needs no order, because it stands, is not judged.
+    """`in_time`: a wheel received its order in time. A standing wheel needs no order and is not judged.
 
-    `late`: (end of the last fresh frame, tick of the failure) of wheels without an order yet. A wheel that is
-    lost switches both motors off, at any time: of that silence nothing is judged.
+    `late`: (end of the last fresh frame, tick of the failure) of wheels without an order yet. A lost wheel switches
+    both motors off at any time: a silence with a lost wheel is not judged.
     """
 
     EVENTS = ("received", "frame", "command", "wheel_lost")
@@ -127,9 +127,7 @@ class SilenceMonitor(OrdersMonitor[SilenceCheck]):
         self.rule.last_tick = -1
 
     def _fail_late(self, tick: int) -> None:
-        """Notes the failure of wheels that are late, once it is known how late: at `tick` they receive their order, or
-        the wait ends.
-        """
+        """Reports late wheels when the delay is known: at `tick` they receive their order, or the wait ends."""
         if self.late is not None:
             (fresh_tick, latest_tick), self.late = self.late, None
             texts = [self._when(order, fresh_tick, tick) for order in self.orders.last.values()]

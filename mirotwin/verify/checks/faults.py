@@ -1,6 +1,6 @@
-"""What firmware must not do, by kinds of firmware fault: four checks that are always on.
+"""Four always-on checks, by kinds of firmware fault.
 
-CPU and board do that while they run (`miro_robot.faults`), so these checks cost next to nothing.
+CPU and board detect faults while they run (`miro_robot.faults`), so these checks cost almost nothing.
 """
 
 from __future__ import annotations
@@ -106,7 +106,7 @@ class StarvedMonitor(Monitor[FaultCheck]):
 
 
 class Lm629Monitor(FaultMonitor):
-    """`refused`: chips whose status byte reported "command error" the last time."""
+    """`refused`: chips whose last status byte reported "command error"."""
 
     def __init__(self, check: FaultCheck, subject: Subject) -> None:
         super().__init__(check, subject)

@@ -1,4 +1,4 @@
-"""Conditions that a check of a board follows itself: what its pins, values and text do from a tick on."""
+"""Conditions that a check of a board follows itself: its pins, values and text from a tick on."""
 
 from __future__ import annotations
 
@@ -19,7 +19,7 @@ NO_NETS = "the board has no parts, so nobody keeps what its pins do"
 
 
 def unknown_source(condition: object, scenario: BoardScenario) -> str:
-    """Why a board cannot show what a condition names, as `key: what; remedy`, or the empty string."""
+    """Reason and remedy if a board lacks the pin or value of a condition, as `key: reason; remedy`; else ""."""
     try:
         if isinstance(condition, OfPin):
             board, pin = scenario.at(condition.pin)
@@ -32,10 +32,10 @@ def unknown_source(condition: object, scenario: BoardScenario) -> str:
 
 
 class Following:
-    """Follows a condition at the board of `subject` from `begin_tick` on, which may be to come.
+    """Follows a condition at the board of `subject` from `begin_tick` on, which may be in the future.
 
-    `heard` gets the characters that the PC receives; `matches(tick)` gives what fits, of what happened before `tick`.
-    `unseen`: why the board does not show it.
+    `heard` takes the characters that the PC receives; `matches(tick)` returns the fitting events before `tick`.
+    `unseen`: the reason why the board does not show the condition, else "".
     """
 
     def __init__(self, condition: Condition, subject: Subject, begin_tick: int) -> None:

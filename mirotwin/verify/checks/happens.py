@@ -92,7 +92,7 @@ class ConditionMonitor(Monitor[ConditionCheck]):
 
 
 class FollowedMonitor(Monitor[ConditionCheck]):
-    """Judges what pins, values and text of a board do."""
+    """Judges the pins, values and text of a board."""
 
     def __init__(self, check: ConditionCheck, subject: Subject) -> None:
         super().__init__(check, subject)
@@ -125,7 +125,7 @@ class FollowedMonitor(Monitor[ConditionCheck]):
 
 
 def wanted(check: ConditionCheck, subject: Subject) -> str:
-    """What a check of one condition asks for, in words."""
+    """The condition of a check, in words."""
     duration = in_ms(check.until_tick - max(check.after_tick, 0), subject.clock)
     if check.KIND == "liveness":
         return f"{check.condition} within {duration}"

@@ -1,4 +1,4 @@
-"""What a check is given, what it answers, and what it must declare about itself.
+"""The interface of checks: their input, their results, and their declarations.
 
 A check is two classes. Its parameters are a frozen struct whose tag is the check's name and its key in `[expect]`;
 their `monitor` method makes a `Monitor`, one for each robot. The monitor is fed in the order of time:
@@ -10,12 +10,12 @@ their `monitor` method makes a `Monitor`, one for each robot. The monitor is fed
     all of it, up to a tick ► until(tick)        what should have happened by now?
     the run is over ────────► end(tick)
 
-and calls `fail` for what is wrong, once each time that it becomes wrong. There are two kinds: safety (this never
-happens) fails at the tick at which it happens; liveness (this happens within a time) at the tick at which the time is
-over. `judged` counts the occasions to judge: a check that had none has not passed.
+and calls `fail` once for each violation, when it begins. There are two kinds: safety (this never happens) fails at the
+tick at which it happens; liveness (this happens within a time) at the tick at which the time is over. `judged` counts
+how often the check applied: a check that never applied has not passed.
 
-A check observes. It may read the robot but changes no bit of a run, so what it remembers stands in plain attributes and
-is part of no saved world.
+A check only observes. It may read the robot but changes no bit of a run, so its memory is plain attributes and is not
+part of a saved world.
 """
 
 from __future__ import annotations
@@ -52,7 +52,7 @@ KEPT = 100
 
 
 class Failure(msgspec.Struct, frozen=True):
-    """`check` failed for a device at `tick`: what was wanted, what was found. `fault`: it is a firmware fault.
+    """`check` failed for a device at `tick`: the wanted and the observed behaviour. `fault`: it is a firmware fault.
 
     `alone_hz`: the crystal of a board alone, 0 for a robot.
     """
@@ -90,11 +90,11 @@ class JudgedDevice(Protocol):
 
 
 class Subject(msgspec.Struct, frozen=True):
-    """The device that is judged: a robot, or a board alone, which runs `image`. `end_tick`: when the run is over by
-    itself. `clock`: ticks per second. `begin_tick`: what happens before is not judged.
+    """The device that is judged: a robot, or a board alone, which runs `image`. `end_tick`: regular end of the run.
+    `clock`: ticks per second. `begin_tick`: earlier events are not judged.
 
     Of a robot: `robots`: slots of its network; `first_slot`: of the robots that are present there; `radio`: from the PC
-    to them. `cut`: the run may be ended before: what was still to come does not fail then. Of a board alone: `sleep`.
+    to them. `cut`: the run may be stopped before its end; then missing events do not fail. Of a board alone: `sleep`.
     """
 
     device: JudgedDevice
@@ -143,8 +143,9 @@ class Check(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_only=Tru
     """Base of every check's parameters.
 
     Derive with `frozen=True, kw_only=True, tag="name_of_the_check"`, give each key its unit and its range
-    (`typing.Annotated` with `msgspec.Meta`), and define `KIND` and `monitor`. `MAIN` is the parameter that a bare value
-    in `[expect]` stands for; a check without one is written `name = true`. `SUBJECTS`: what it can judge.
+    (`typing.Annotated` with `msgspec.Meta`), and define `KIND` and `monitor`. `MAIN` is the parameter set by a bare
+    value in `[expect]`; a check without one is written `name = true`. `SUBJECTS`: the kinds of device that it can
+    judge.
     """
 
     KIND: ClassVar[Kind]
@@ -158,11 +159,11 @@ class Check(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_only=Tru
         return str(self.__struct_config__.tag)
 
     def problem(self, end_tick: int) -> str:
-        """Why a run that ends at `end_tick` cannot be judged, or the empty string."""
+        """Reason why a run that ends at `end_tick` cannot be judged; "" if it can."""
         return ""
 
     def problem_alone(self, scenario: BoardScenario) -> str:
-        """Why it cannot judge this board, as `key: what; remedy`, or the empty string."""
+        """Reason why it cannot judge this board, as `key: reason; remedy`; "" if it can."""
         return ""
 
     def monitor(self, subject: Subject) -> Monitor[Check]:
@@ -180,9 +181,9 @@ class Monitor(Generic[C_co]):
     """Kinds of event that `event` gets, of `EVENT_KINDS`: of the robot and of its network's PC. `frame` is a valid
     frame at the robot, with value 1 if it is fresh; `damaged` are characters at the robot that are no frame."""
     unseen = ""
-    """Why no run of this robot shows what is judged, such as a symbol that its image lacks: "not observable"."""
+    """Reason why no run of this robot can be judged, such as a symbol missing in its image: "not observable"."""
     missed = ""
-    """Why this run had no occasion for it, if there is more to say than that."""
+    """Further reason why the check never applied in this run, if there is one."""
     LATER = False
     """`period` may be called in batches, where no check listens to events of the board. Such a monitor must not read
     the robot except in `period_over` and `end`."""
@@ -209,16 +210,18 @@ class Monitor(Generic[C_co]):
         """Something that happened, of the kinds in `EVENTS`."""
 
     def restarted(self, tick: int) -> None:
-        """The robot's processor was reset, or its supply was switched: it remembers nothing of before."""
+        """The robot's processor was reset, or its supply was switched: it has no memory of earlier events."""
 
     def fault(self, fault: FirmwareFault) -> None:
-        """The firmware did what it must not."""
+        """A firmware fault occurred."""
 
     def period(self, record: RobotPeriod, tick: int) -> None:
         """The robot as it was at `tick`, the start of the control period that is over."""
 
     def period_over(self) -> None:
-        """A control period is over. The robot can be read as it is now; `period` is called now or later."""
+        """Called at the end of a control period, when the robot's present state can be read; `period` is called now or
+        later.
+        """
 
     def until(self, tick: int) -> None:
         """All events before `tick` have been reported."""
@@ -231,7 +234,7 @@ class Monitor(Generic[C_co]):
 
 
 def ms_ticks(time_ms: float, clock: int = TICKS_PER_SECOND) -> int:
-    """Ticks of so many milliseconds, which need not be whole; rounded half up."""
+    """Milliseconds to ticks; fractions are allowed and rounded half up."""
     return ticks(time_ms / 1000.0, clock)
 
 
@@ -246,7 +249,7 @@ def at(tick: int, clock: int = TICKS_PER_SECOND) -> str:
 
 
 class FirstFailure(msgspec.Struct, frozen=True):
-    """The earliest failure of a check: of which robot, at which tick, what was wanted and found."""
+    """The earliest failure of a check: robot, tick, wanted and observed behaviour."""
 
     network: int
     slot: int
@@ -258,9 +261,9 @@ class FirstFailure(msgspec.Struct, frozen=True):
 class Expectation(msgspec.Struct, frozen=True, omit_defaults=True):
     """The result of a check, over all robots.
 
-    `kind`: safety (never) or liveness (within a time). `verdict`: passed, failed, "not judged" where the run had no
-    occasion for it, "not observable" where no run of such robots shows it; `reason` says why. `failures`: how many;
-    `first`: the earliest.
+    `kind`: safety (never) or liveness (within a time). `verdict`: passed, failed, "not judged" (it never applied in
+    this run) or "not observable" (no run of such robots shows it); `reason`: for the last two. `failures`: their
+    number; `first`: the earliest.
     """
 
     name: str
@@ -272,7 +275,7 @@ class Expectation(msgspec.Struct, frozen=True, omit_defaults=True):
 
 
 def checked_monitor(check: Check, subject: Subject) -> Monitor[Any]:
-    """The monitor of one robot. Raises PluginError for what is not one."""
+    """The monitor of one robot. Raises PluginError if `check` does not return a monitor."""
     monitor: Any = check.monitor(subject)
     place = defined_at(check.monitor)
     if not isinstance(monitor, Monitor):

@@ -18,7 +18,7 @@ class Memory:
     def __getitem__(self, name: str) -> Any:
         """The variable `name` by its C type: int, float, bool, a list for an array, a dict for a struct.
 
-        Names as `file:name`, `name[2]`, `name.x`. Raises BadInput for one that the .cdb beside the image does not know.
+        Names as `file:name`, `name[2]`, `name.x`. Raises BadInput for a name that is not in the .cdb beside the image.
         """
         from miro_robot.image.c_types import value_of  # few checks read variables: no run need load this
         from miro_robot.image.variables import find_variable

@@ -6,11 +6,11 @@
     checks.finish()
     checks.check()  # raises ExpectationFailed; or look at `failures`, `verdicts()`
 
-The world tells its observers at the end of each control period. Parts of a board run ahead of each other, so only
-events before the tick at which the world stands are told, in the order of ticks; the others wait for the next look. A
-wait (`World.run_until`) may note an event twice and take it back; at the end of a period each stands in the log once.
-Nothing here changes a bit of the run. Where all monitors may be told later, some control periods are told together:
-after a simulated one the caches hold nothing of this.
+The world calls its observers at the end of each control period. Parts of a board run ahead of each other, so only
+events before the world's present tick are passed on, in the order of ticks; the others wait for the next call. A wait
+(`World.run_until`) may log an event twice and remove it again; at the end of a period each is in the log once. Nothing
+here changes a bit of the run. If all monitors allow it, several control periods are passed on together, because after
+each simulated period the caches contain none of this code and data.
 """
 
 from __future__ import annotations
@@ -77,11 +77,11 @@ class ExpectationFailed(AssertionError):
 
 
 class Checks:
-    """The checks of a world from now on: what its scenario expects of each robot, and those that are always on.
+    """The checks of a world from now on: its scenario's expectations on each robot, and the always-on checks.
 
-    `expected` replaces that, by network and slot. `cut`: the run may be ended before it is over. `named`: the checks
-    that the user named. Begin with the run: a check does not know earlier orders to the wheels. RuntimeError is
-    raised if the world is loaded meanwhile, because what a check remembers is not saved.
+    `expected` replaces both, by network and slot. `cut`: the run may be stopped before its end. `named`: the checks
+    that the user named. Create it at the start of the run: a check does not know earlier orders to the wheels. Raises
+    RuntimeError if the world is loaded meanwhile, because a check's memory is not saved.
     """
 
     def __init__(self, world: World, expected: Expected | None = None, cut: bool = False) -> None:
@@ -127,7 +127,7 @@ class Checks:
         self._each(lambda watched: watched.look(unreported))
 
     def finish(self) -> None:
-        """The run is over, by itself or because it was broken off."""
+        """Ends the checks, after a complete or interrupted run."""
         if not self.finished:
             self.finished = True
             self.world.observers.remove(self._look)
@@ -135,7 +135,7 @@ class Checks:
             self._each(_DeviceMonitors.end)
 
     def _each(self, tell: Callable[[_DeviceMonitors], None]) -> None:
-        """Calls `tell` for each device. A monitor may be a user's: what it raises is a PluginError with its name."""
+        """Calls `tell` for each device. A user's monitor that raises becomes a PluginError with its name."""
         for watched in self.devices:
             try:
                 tell(watched)
@@ -158,7 +158,7 @@ class Checks:
             raise ExpectationFailed(self.failures)
 
     def verdicts(self) -> tuple[Expectation, ...]:
-        """One for each name, over all robots, in the order of names as they were expected."""
+        """One result for each name, over all robots, in the order of the expectations."""
         by_name: dict[str, list[Monitor[Any]]] = {}
         for monitor in self.monitors:
             by_name.setdefault(monitor.check.name, []).append(monitor)
@@ -168,7 +168,7 @@ class Checks:
 
     @property
     def ended_early(self) -> bool:
-        """True if who runs the world ended it: what was still to come counts neither for nor against it."""
+        """True if the run was stopped before its end: missing later events count neither for nor against it."""
         return self.cut and self.world.tick < self.world.periods * self.world.period_ticks
 
     @property
@@ -188,8 +188,9 @@ class Checks:
 
 
 class _DeviceMonitors:
-    """One device and its monitors. `check`: whose monitor receives something now. `lost`: events that the log did not
-    hold any more when they were requested.
+    """One device and its monitors. `check`: owner of the monitor being called.
+
+    `lost`: events that had already left the log when they were requested.
     """
 
     def __init__(

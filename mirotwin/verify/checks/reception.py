@@ -139,8 +139,9 @@ class BackInSync(ActsCheck, frozen=True, kw_only=True, tag="back_in_sync_within_
 
 
 class ActsMonitor(OrdersMonitor[ActsCheck]):
-    """`damaged`: characters that are no frame came since the last frame. `lost`: a wheel does not follow, so the robot
-    has to stand until both receive the order to.
+    """`damaged`: characters that are no frame came since the last frame.
+
+    `lost`: a wheel does not follow, so the robot must stand until both wheels are ordered to stand.
     """
 
     EVENTS = ("frame", "damaged", "command", "wheel_lost")
@@ -181,7 +182,7 @@ class ActsMonitor(OrdersMonitor[ActsCheck]):
                 self.rule.team(frame.last_tick, *words)
 
     def _stopping(self) -> bool:
-        """True if both wheels have the order to stop, with their loops closed: velocity 0 changes nothing for them."""
+        """True if both wheels are ordered to stop with their loops closed: velocity 0 changes nothing for them."""
         return all(order.what != "off" and not order.moves for order in self.orders.last.values())
 
     def until(self, tick: int) -> None:

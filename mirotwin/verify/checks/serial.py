@@ -1,4 +1,4 @@
-"""What a serial port took and gave: for checks that judge answers, and one of sleep."""
+"""Characters that a serial port received and sent: for checks that judge answers, and for one about sleep."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ from mirotwin.verify.checks.interface import Check, Kind, Monitor, Subject, Subj
 class Character(NamedTuple):
     """A character that the serial port sent or received. `tick`: RI or TI went up.
 
-    `stop_good`: the stop bit was a mark, so far as the mode of the serial port can tell.
+    `stop_good`: the stop bit was a mark, if the mode of the serial port detects it.
     """
 
     value: int

@@ -1,4 +1,4 @@
-"""Checks of what a board does at its pins, its serial port and its parts during a whole run."""
+"""Checks of a board's pins, serial port and parts during a whole run."""
 
 from __future__ import annotations
 

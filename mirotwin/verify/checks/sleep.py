@@ -1,4 +1,4 @@
-"""True if firmware that sleeps when it has nothing to do sleeps again at the end of a run."""
+"""Checks that firmware which sleeps when idle sleeps again at the end of a run."""
 
 from __future__ import annotations
 
@@ -10,8 +10,8 @@ from miro_robot.mcs51.uart import STOPPED_TICK
 class Sleep:
     """The sleep of the processor of a board alone. The driver of the run stops at each `next_tick`.
 
-    `sleeps`: it slept before `begin_tick`; None while that is not known. `late_cycles`: how long it had slept 30 ms (at
-    24 MHz) before `end_tick`; -1 while that is not known.
+    `sleeps`: it slept before `begin_tick`; None while that is not known. `late_cycles`: cycles slept so far at 30 ms
+    (at 24 MHz) before `end_tick`; -1 while unknown.
     """
 
     def __init__(self, cpu: Cpu, begin_tick: int, end_tick: int) -> None:

@@ -1,8 +1,8 @@
-"""The steps that a scenario may have, each an action or a wait, and what a host may say in one: a frozen struct a kind.
+"""The steps of a scenario, actions and waits, and the frames of a host: one frozen struct per kind.
 
-A table of a step has one key that says what it is, its verb: `VERBS`. The others are the verb's own. A new kind is a
+A step's table has one key that names its kind, the verb: `VERBS`. The other keys belong to the verb. A new kind is a
 class here with `do`, in the table `PLAIN`, and a row on the page of the steps. Its verb is no key that every step has.
-What a step leaves is an attribute of `Player`; `Run.result` and `play_at_port` put it into what is said of a run.
+A step's result is an attribute of `Player`; `Run.result` and `play_at_port` add it to the result of a run.
 """
 
 from __future__ import annotations
@@ -71,7 +71,7 @@ class Step(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_only=True
     NEEDS: ClassVar[Feature | None] = None
     """The feature of the machine that the step needs."""
     SUBJECTS: ClassVar[tuple[Kind, ...]] = BOTH
-    """What it can be done with: robots, a board alone."""
+    """The kinds of device that it works with: robots, a single board."""
 
     number: int = 0
     note: str = ""
@@ -88,24 +88,24 @@ class Step(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_only=True
 
     @property
     def subjects(self) -> tuple[Kind, ...]:
-        """What it can be done with, by all its keys."""
+        """The kinds of device that it works with, considering all its keys."""
         return self.SUBJECTS
 
     def problem(self, network: ScenarioNetwork) -> str:
-        """Why it cannot be done in this network of robots, as `key: what; remedy`, or the empty string."""
+        """Reason why this network of robots does not allow it, as `key: reason; remedy`; "" if it does."""
         return absent(getattr(self, "slot", None), network)
 
     def problem_alone(self, scenario: BoardScenario) -> str:
-        """Why it cannot be done with the board of a scenario, as `key: what; remedy`, or the empty string."""
+        """Reason why the board of a scenario does not allow it, as `key: reason; remedy`; "" if it does."""
         return ""
 
     def do(self, player: Player) -> None:
-        """Does it, and lets time pass as far as it says."""
+        """Executes the step; time passes as far as the step requires."""
         raise NotImplementedError
 
     @property
     def lasts_ms(self) -> float:
-        """How long it takes at least."""
+        """Shortest duration of the step in milliseconds."""
         return float(getattr(self, "for_ms", 0.0))
 
     def in_words(self) -> str:
@@ -119,13 +119,13 @@ class Step(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_only=True
 
 
 class OfNetwork(Step, frozen=True, kw_only=True):
-    """Base of those that name their network."""
+    """Base of steps with a `network` key."""
 
     network_: Network | None = msgspec.field(default=0, name="network")
 
 
 class OfRobot(OfNetwork, frozen=True, kw_only=True):
-    """Base of those for the robot in `slot` (left out: the network's first)."""
+    """Base of steps for the robot in `slot` (left out: the network's first)."""
 
     slot: Slot | None = None
 
@@ -228,7 +228,7 @@ class SendPoll(SendFrame, frozen=True, kw_only=True, tag="poll"):
 
 
 class SendPing(SendFrame, frozen=True, kw_only=True, tag="ping"):
-    """Sets nothing, and counts as fresh."""
+    """A frame that sets nothing, and counts as fresh."""
 
     def frame(self, host: Host, slot: int, seq: int) -> ServiceFrame:
         return ServiceFrame.ping(seq, slot)
@@ -280,7 +280,7 @@ class SendCharacters(Send, frozen=True, kw_only=True):
         return ""
 
     def characters(self) -> tuple[bytes, tuple[int, ...]]:
-        """The bytes, and the indices of those whose stop bit is bad."""
+        """The bytes, and the indices of those with a bad stop bit."""
         raise NotImplementedError
 
     def do(self, player: Player) -> None:
@@ -375,7 +375,7 @@ class StreamStep(OfRobot, frozen=True, kw_only=True):
 
 
 class ConditionStep(Step, frozen=True, kw_only=True):
-    """Base of those that look for events."""
+    """Base of steps that wait for events."""
 
     CHANGES = False
 
@@ -630,7 +630,7 @@ PLAIN: dict[str, type[Step]] = {
         *(PutStep, PressStep, FaultStep),
     )
 }
-"""Steps whose table is read as it stands."""
+"""Steps whose table contains only their own keys."""
 LOOKING: dict[str, type[ConditionStep]] = {
     "wait_for": WaitStep,
     "expect": WaitStep,
@@ -638,7 +638,7 @@ LOOKING: dict[str, type[ConditionStep]] = {
     "silence_for_ms": SilenceStep,
     "hold": HoldStep,
 }
-"""Steps whose table holds the keys of a condition, too."""
+"""Steps whose table also contains the keys of a condition."""
 VERBS = ("send", *LOOKING, *PLAIN)
 
 

@@ -1,14 +1,14 @@
-"""Does the steps of a scenario in a world, in virtual time, one after the other.
+"""Executes the steps of a scenario in a world, in virtual time, one after the other.
 
     player = player_of(world, steps_of(scenario, origin), origin)
     player.play()                          to the first step that fails, or to the last
     player.finish()                        and on to the end of the run
-    player.failure                         None, or what was wanted and what was found
+    player.failure                         None, or the wanted and the observed behaviour
 
-An action takes no time; what it does begins some microseconds later. A wait ends at the tick of its event and leaves
-what happens later, also on the same tick, to the next one. So does a pause; what happens in `never`, `hold` and
-`silence_for_ms` is past when they end. Once a control period, and before each frame of a stream, the world stops on the
-way, which changes nothing of the run.
+An action takes no time; its effect begins some microseconds later. A wait ends at the tick of its event; later events,
+also on the same tick, are left for the next wait. The same holds for a pause. Events during `never`, `hold` and
+`silence_for_ms` are consumed. The world stops once a control period, and before each frame of a stream, which does not
+change the run.
 """
 
 from __future__ import annotations
@@ -54,8 +54,8 @@ WHEELS = Wheels()
 class Host(FrameSender):
     """The host of one network; its first frame has number 1.
 
-    It sends a stream of team frames. The first start bit of the next frame is due at `due_tick`, and is announced
-    `lead_ticks` before. `remaining`: frames that it still sends; None: no end.
+    It sends a stream of team frames. `due_tick`: first start bit of the next frame, which is announced `lead_ticks`
+    earlier. `remaining`: frames that it still sends; None: no end.
     """
 
     def __init__(self, machine: Machine, network: int) -> None:
@@ -81,12 +81,12 @@ class Host(FrameSender):
         self.top_up()
 
     def end(self) -> None:
-        """No more frames."""
+        """Ends the stream of frames."""
         self.due_tick, self.lead_ticks = NEVER_TICK, 0
 
     @property
     def next_tick(self) -> int:
-        """When the next frame of the stream has to be announced."""
+        """Tick at which the next frame of the stream must be announced."""
         return self.due_tick - self.lead_ticks
 
     def top_up(self) -> None:
@@ -101,9 +101,9 @@ class Host(FrameSender):
 
 
 class StepFailure(msgspec.Struct, frozen=True):
-    """`step` failed at `tick`: what was wanted, what was found.
+    """`step` failed at `tick`: wanted and observed behaviour.
 
-    `begun_tick`: where the step began; `timed_out`: it waited for what did not come. `clock`: ticks per second.
+    `begun_tick`: begin of the step; `timed_out`: it waited in vain. `clock`: ticks per second.
     """
 
     step: str
@@ -120,16 +120,16 @@ class StepFailure(msgspec.Struct, frozen=True):
 
 
 class _Failed(Exception):
-    """A step was not fulfilled: the tick, what was wanted, what was found, and whether it waited for that."""
+    """A failed step: tick, wanted and observed behaviour, and True if it waited in vain."""
 
 
 class Player:
-    """Plays the steps of a scenario on a machine.
+    """Executes the steps of a scenario on a machine.
 
-    `steps`: the steps that the machine can do and show, up to the first that it cannot do and that changes what
-    follows. `unseen`: a line for each step that it cannot do or show. `count`: number of all steps; `done`: number of
-    steps done, `took_ticks`: how long each took. `saved`: states of `save` steps, by name. `checks`: checks that steps
-    began.
+    `steps`: the steps that the machine can execute and observe, up to the first that it cannot and on which later steps
+    depend. `unseen`: a line for each step that it cannot execute or observe. `count`: number of all steps; `done`:
+    number of steps done, `took_ticks`: how long each took. `saved`: states of `save` steps, by name. `checks`: checks
+    that steps began.
     """
 
     def __init__(self, machine: Machine, steps: Sequence[Step], origin: str = "") -> None:
@@ -169,7 +169,7 @@ class Player:
         self.finish()
 
     def play(self) -> None:
-        """Does the steps. Raises ScenarioError for one that the file cannot have meant."""
+        """Executes the steps. Raises ScenarioError for an impossible step."""
         for step in self.steps[self.done :]:
             begun_tick = self.machine.tick
             try:
@@ -191,7 +191,7 @@ class Player:
             self.took_ticks.append(self.machine.tick - begun_tick)
 
     def finish(self) -> None:
-        """Runs to the end; what goes on by itself goes on. Ends the checks that steps began."""
+        """Runs to the end with streams and held buttons continuing, and ends the checks that steps began."""
         machine = self.machine
         while not machine.finished:
             # Not past the next frame of a stream: a frame cannot be announced for a tick that is settled.
@@ -247,7 +247,7 @@ class Player:
             raise _Failed(machine.tick, f"{for_ms:g} ms of it", self._end())
 
     def _let_act(self) -> None:
-        """On to where the actions of the steps before have been done: what holds from now on is what they made."""
+        """Runs until the actions of earlier steps have taken effect, so that a following check judges their result."""
         machine = self.machine
         if isinstance(machine, World) and not self.hosts:  # a board
             begun_tick, last_tick = machine.tick, machine.earliest_action_tick
@@ -309,7 +309,7 @@ class Player:
         self.checks.append(Checks(self.world, dict.fromkeys(places, checks)))
 
     def break_hardware(self, fault: Fault, name: str) -> None:
-        """Breaks hardware as soon as possible; what breaks, and is not mended, has to change something."""
+        """Breaks hardware as soon as possible; a break without a repair must change something in the run."""
         Proof.begin(self.proofs, self.world, name, fault)
         self.machine.do(fault)
 
@@ -334,7 +334,7 @@ class Player:
         machine.do(Put(self.pressed[button], 0, 0, f"{button}.pressed", False))
 
     def _watch_pins(self) -> None:
-        """From now on the boards keep the edges of the pins that steps name: a wait knows how they stand."""
+        """Lets the boards record the edges of the pins named in steps, so that a wait knows their levels."""
         for step in self.steps:
             condition = getattr(step, "condition", None)
             if isinstance(condition, OfPin) and "board" in condition.SUBJECTS:
@@ -351,7 +351,7 @@ class Player:
         return f"that {stopped}"
 
     def _nothing(self, wanted: Condition, earlier: Sequence[Event]) -> str:
-        """The text of what happened instead of the event that was wanted."""
+        """Text about the events that happened instead of the wanted one."""
         parts = [self._end()] if self.machine.finished else []
         if isinstance(wanted, WheelSpeeds):
             parts.append(self._speeds(wanted))

@@ -1,7 +1,7 @@
-"""A scenario's `[[step]]` tables to steps, and in one line what is wrong with one of them.
+"""Converts a scenario's `[[step]]` tables to steps; reports an error in one line.
 
 [[step]]
-send = "team"                          the verb, and for some what of it
+send = "team"                          the verb, for some with its object
 left_m_s = 0.2                         its keys
 note = "drives off"                    for people
 """
@@ -51,10 +51,8 @@ def steps_in(text: AnyText) -> list[Step]:
 
 
 def check_order(steps: Sequence[Step], scenario: Scenario | BoardScenario, origin: str) -> None:
-    """Raises ScenarioError for what the steps together make impossible.
-
-    That is the first step for which the run is too short, if all waits took no time at all, and a file that is saved
-    twice.
+    """Raises ScenarioError for an impossible sequence of steps: the first step for which the run is too short even if
+    waits took no time, and a file that is saved twice.
     """
     end, begins, clock = scenario.end_tick, 0, scenario.clock
     saved: dict[str, int] = {}
@@ -76,7 +74,7 @@ def check_order(steps: Sequence[Step], scenario: Scenario | BoardScenario, origi
 
 
 class _Table:
-    """One table to be read."""
+    """A table being read."""
 
     def __init__(
         self, scenario: Scenario | BoardScenario, origin: str, index: int, table: Mapping[str, Any]
@@ -110,7 +108,7 @@ class _Table:
         return step
 
     def check_subject(self, step: Step, verb: str) -> None:
-        """Refuses what is for robots with a board alone, and the other way round."""
+        """Refuses a step for robots on a single board, and vice versa."""
         alone = isinstance(self.scenario, BoardScenario)
         if ("board" if alone else "robot") not in step.subjects:
             value = self.table[verb]
@@ -120,7 +118,7 @@ class _Table:
             )
 
     def others(self, verb: str) -> str:
-        """What could stand there instead."""
+        """The verbs possible in its place."""
         kind: Kind = "board" if isinstance(self.scenario, BoardScenario) else "robot"
         choices: Mapping[str, Any] = SENDS if verb == "send" else CONDITIONS if verb in LOOKING else PLAIN
         return use_one_of([name for name, struct in choices.items() if kind in struct.SUBJECTS])
