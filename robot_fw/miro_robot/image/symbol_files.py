@@ -127,7 +127,7 @@ def _map_space(area: str, attributes: list[str]) -> str:
     for attribute, space in (("CODE", "code"), ("XDATA", "xram"), ("BIT", "bit")):
         if attribute in attributes:
             return space
-    return "sfr" if "ABS" in area else "iram"
+    return "sfr" if "ABS" in area else "bit" if area == "BSEG" else "iram"
 
 
 _MAP_MODULE = re.compile(r"^(\S+)\.rel\s+\[", re.MULTILINE)

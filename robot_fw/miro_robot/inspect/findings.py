@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections import Counter
 from collections.abc import Callable, Iterable, Iterator
 from pathlib import PureWindowsPath as AnyPath
 
@@ -9,6 +10,7 @@ import msgspec
 
 from miro_robot.image import Image
 from miro_robot.inspect import sanitizer
+from miro_robot.inspect.read_again import read_again
 from miro_robot.inspect.sanitizer import CHECKED, LOST, SHARED, TORN_READ, TORN_WRITE, Sanitizer
 from miro_robot.inspect.sanitizer_layout import XRAM, Layout
 from miro_robot.inspect.symbol_names import SymbolNames
@@ -50,6 +52,10 @@ _NOTES = {
     sanitizer.NO_CODE: ("memory", "reads code at {address}, outside of the image"),
     sanitizer.CONST: ("memory", "writes through a pointer to code"),
     sanitizer.UNWRITTEN: ("memory", "reads external RAM at {address}, which nothing wrote"),
+}
+_DEAF = {
+    sanitizer.UNREAD: "clears RI, and never reads SBUF",
+    sanitizer.OVERRUN: "never reads SBUF, where characters come",
 }
 _REGISTERS = (*(f"R{number}" for number in range(8)), "A", "B", "DPTR", "CY", "the bank")
 
@@ -97,6 +103,7 @@ class Reader:
     def __init__(self, image: Image, layout: Layout) -> None:
         self.names = SymbolNames(image)
         self.layout = layout
+        self.code = image.code
 
     def findings(self, seen: Sanitizer) -> list[Finding]:
         """One for each cause: what happened goes before what may."""
@@ -106,11 +113,16 @@ class Reader:
         return sorted(best.values(), key=lambda one: (not one.did, one))
 
     def _all(self, seen: Sanitizer) -> Iterator[Finding]:
+        again = self._read_again(seen)
         for (kind, first, second), (tick, between, key) in seen.events.items():
+            if kind == TORN_READ and any(first in loop and second in loop for loop in again[key]):
+                continue
             yield self._race((kind, first, second), key, between & 0xFFFF, tick, between >> 16, did=True)
         for pair, (key, sources_open, tick) in seen.pairs.items():
             if pair[0] == LOST and key in self.layout.elements:
                 continue  # a buffer is handed over by a flag, which nobody sees
+            if pair[0] == TORN_READ and any(pair[1] in loop and pair[2] in loop for loop in again[key]):
+                continue
             touches: Iterable[Callable[[int, int], int]]
             touches = {TORN_WRITE: (seen.writer, seen.reader), CHECKED: (seen.zeroer,)}.get(
                 pair[0], (seen.writer,)
@@ -124,11 +136,23 @@ class Reader:
         for (mistake, pc, other, which), tick in seen.notes.items():
             grouped.setdefault((mistake, pc), []).append((tick, other, which))
         for (mistake, pc), each in grouped.items():
-            yield self._mistake(mistake, pc, each)
+            yield self._mistake(mistake, pc, each, not seen.reads_sbuf)
 
-    def _mistake(self, mistake: int, pc: int, each: list[tuple[int, int, int]]) -> Finding:
-        """`each`: (tick, the other instruction, which one) of the times that differ."""
+    def _read_again(self, seen: Sanitizer) -> dict[int, list[range]]:
+        """By variable: the loops that read it until two values are equal."""
+        torn = {(first, both[0]) for (kind, first, _), both in seen.pairs.items() if kind == TORN_READ}
+        torn |= {(first, key) for (kind, first, _), (_, _, key) in seen.events.items() if kind == TORN_READ}
+        sizes = Counter(key for _, key in self.layout.places.values())
+        loops: dict[int, list[range]] = {key: [] for _, key in torn}
+        for first, key in torn:
+            bytes_of_it = range(key, key + sizes[key])
+            loops[key] += [read_again(self.code, first, bytes_of_it, bank) for bank in (0, 8, 16, 24)]
+        return loops
+
+    def _mistake(self, mistake: int, pc: int, each: list[tuple[int, int, int]], deaf: bool) -> Finding:
+        """`each`: (tick, the other instruction, which one) of the times that differ; `deaf`: nothing reads SBUF."""
         (kind, says), (tick, other, which) = _NOTES[mistake], min(each)
+        says = _DEAF.get(mistake, says) if deaf else says
         changed = [name for number, name in enumerate(_REGISTERS) if number in {one for _, _, one in each}]
         words = says.format(
             which=", ".join(changed),

@@ -11,6 +11,7 @@ cdef int _TORN_READ, _TORN_WRITE, _LOST, _SHARED, _SFRS, _EA, _CHECKED, _DEC, _D
 cdef int _CALL, _RET, _RETI, _PUSH, _CLEAR, _JBC, _MOVC, _MOVX_READ, _MOVX_WRITE
 cdef int _SP, _SCON, _SBUF, _RI_BIT, _RI, _MODES, _TL0, _TH1, _TL2, _TH2
 cdef long long _NEVER
+cdef int _LONGEST_GAP, _ENDED
 cdef int _DEEPEST, _GROWTHS, _NEAR, _AGAIN, _IN_CODE, _ENOUGH
 cdef int _REGISTERS, _RET_OF_INTERRUPT, _RETI_OF_CALL, _OVERWRITTEN, _UNBALANCED, _LEAK
 cdef int _CUT_OFF, _UNREAD, _TIMER, _NO_RAM, _NO_CODE, _CONST, _UNWRITTEN, _OVERRUN
@@ -59,6 +60,8 @@ cdef class Sanitizer(Watcher):
     cdef long long half_step[9]
     cdef int half_pc[9]
     cdef int other_pc[9]
+    cdef int copied[65536]
+    cdef readonly int reads_sbuf
     cdef Interrupts interrupts
     cdef long long tick
 
@@ -94,6 +97,9 @@ cdef class Sanitizer(Watcher):
     cdef _cleared(self, int pc)
     @cython.locals(address=int, page=bint)
     cdef _special(self, Cpu cpu, int special, int pc, int opcode)
+    @cython.locals(after=int)
+    cdef bint _in_gap(self, Cpu cpu, int address, int last)
+    @cython.locals(last=int)
     cdef _grown(self, int sp, int pc)
     @cython.locals(at=int, register=int)
     cdef _enter(self, Cpu cpu, int entry, int back, int source)

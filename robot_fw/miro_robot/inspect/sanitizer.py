@@ -34,6 +34,7 @@ _UNBALANCED, _LEAK, _CUT_OFF, _UNREAD, _TIMER, _NO_RAM = UNBALANCED, LEAK, CUT_O
 _NO_CODE, _CONST, _UNWRITTEN, _OVERRUN = NO_CODE, CONST, UNWRITTEN, OVERRUN
 _TORN_READ, _TORN_WRITE, _LOST, _SHARED, _CHECKED = TORN_READ, TORN_WRITE, LOST, SHARED, CHECKED
 _DEC, _DJNZ, _SOON = 0x15, 0xD5, 6
+_LONGEST_GAP, _ENDED = 64, 8
 _NO_TIMERS = 0x15  # the sources that are none, as bits of IE
 
 
@@ -88,7 +89,7 @@ class Sanitizer(Watcher):
         self.frame_sp = [0] * 128  # SP after the call
         self.frame_back = [0] * 128  # where it has to return to
         self.frame_entry = [0] * 128
-        self.frame_source = [0] * 128  # 0 of a call, else 1 + source
+        self.frame_source = [0] * 128  # 0 of a call, else 1 + source, and `_ENDED` after its RETI
         self.saved = [0] * 1664  # registers at interrupts, 13 a frame
         self.from_reset = 0  # whether frame 0 is that of reset, and no jump went astray
         self.leak_sp = [0] * 65536
@@ -102,6 +103,8 @@ class Sanitizer(Watcher):
         self.half_step = [0] * 9
         self.half_pc = [0] * 9
         self.other_pc = [0] * 9
+        self.copied = [-2] * 65536  # by instruction: what it read last of code
+        self.reads_sbuf = 0
         for address, line in layout.lines.items():
             self.line_of[address] = line
         for place, (kind, key) in layout.places.items():
@@ -314,6 +317,7 @@ class Sanitizer(Watcher):
     def _read_register(self, cpu: Cpu, address: int, pc: int) -> None:
         if address == _SBUF:
             self.unread = 0
+            self.reads_sbuf = 1
             self.cleared_pc = -1
         elif _TL0 <= address <= _TH1:
             timer = (address - _TL0) & 1
@@ -388,8 +392,9 @@ class Sanitizer(Watcher):
                 self._cleared(pc)
         elif special == _MOVC:
             address = (self.a + (cpu.dptr if opcode == 0x93 else pc + 1)) & 0xFFFF
-            if not cpu.is_loaded(address):
+            if not cpu.is_loaded(address) and not self._in_gap(cpu, address, self.copied[pc]):
                 self._note(_NO_CODE, pc, -1, address)
+            self.copied[pc] = address
         elif self.ram >= 0:
             page = opcode & 0xF == 2 or opcode & 0xF == 3
             address = cpu.page() << 8 | cpu.iram[cpu.bank + (opcode & 1)] if page else cpu.dptr
@@ -400,14 +405,28 @@ class Sanitizer(Watcher):
             elif not self.written[address]:
                 self._note(_UNWRITTEN, pc, -1, address)
 
+    def _in_gap(self, cpu: Cpu, address: int, last: int) -> bool:
+        """A block copy or a checksum goes on from the image into the image; a string without an end goes anywhere."""
+        if address != last + 1:
+            return False
+        after = address
+        while after < 0xFFFF and after < address + _LONGEST_GAP and not cpu.is_loaded(after):
+            after += 1
+        return bool(cpu.is_loaded(after))
+
     def _grown(self, sp: int, pc: int) -> None:
-        """In the frame of reset the stack is as high at an instruction each time, unless something stays on it."""
-        if self.depth or self.level or not self.from_reset:
+        """At an instruction of the frame of reset the stack is as high each time, unless something stays on it: bytes,
+        or a frame that was left by a jump. Recursion grows too, in a function that was called.
+        """
+        last = self.leak_sp[pc]
+        if self.level or not self.from_reset or (self.depth and not last):
             return
-        if self.leak_sp[pc] and sp > self.leak_sp[pc]:
+        if last and sp > last:
             self.leak_count[pc] += 1
             if self.leak_count[pc] == _GROWTHS:
                 self._note(_LEAK, pc, -1, 0)
+        elif sp < last:
+            self.leak_count[pc] = 0
         self.leak_sp[pc] = sp
 
     def _enter(self, cpu: Cpu, entry: int, back: int, source: int) -> None:
@@ -439,6 +458,10 @@ class Sanitizer(Watcher):
         """RET or RETI went somewhere; what was pushed and not popped makes it a jump, unless one byte is left."""
         before = cpu.sp + 2
         below = -1
+        for at in range(self.depth - 1, -1 if by_reti else self.depth, -1):
+            if self.frame_source[at]:
+                self.frame_source[at] |= _ENDED  # the interrupt is over, wherever it goes on
+                break
         while self.depth and self.frame_sp[self.depth - 1] > before:
             self.depth -= 1
             below = self.frame_sp[self.depth] - 2
@@ -459,7 +482,7 @@ class Sanitizer(Watcher):
         else:
             self.depth = at
             source = self.frame_source[at]
-            if source and not by_reti:
+            if source and not source & _ENDED:
                 self._note(_RET_OF_INTERRUPT, pc, -1, source - 1)
             elif by_reti and not source and self.frame_entry[at] != pc:
                 self._note(_RETI_OF_CALL, pc, self.frame_entry[at], 0)

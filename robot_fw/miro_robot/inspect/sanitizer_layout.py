@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from collections.abc import Iterator
 
 import msgspec
@@ -23,6 +24,8 @@ _INDIVISIBLE = {0x05, 0x06, 0x15, 0x16, 0x42, 0x43, 0x52, 0x53, 0x62, 0x63, 0xC5
 _IMMEDIATE = {0x75, 0x76}
 _PARAMETER = "_PARM_"
 _MOST_PARAMETER_BYTES = 4
+_LOCAL_PLACE = re.compile(r"^L:L\w+\.(\w+)\$(\w+)\$\w+\$\w+:([0-9A-F]{1,8})$", re.MULTILINE)
+"""Of a .cdb: function, C name and address; it has them of parameters without their types."""
 
 READS = bytes(next((FORMS[word] for word in READS_BY_ROW[ROW[op]] if word in FORMS), 0) for op in range(256))
 WRITES = bytes(FORMS[written_form(ROW[op])] for op in range(256))
@@ -93,7 +96,8 @@ def _shared(image: Image) -> tuple[dict[int, tuple[int, int]], dict[tuple[int, s
     """What the map alone says: the area of overlays, and parameters of library functions."""
     symbols = image.symbols.names
     in_ram = sorted({one.address for one in symbols.values() if one.space == "iram"})
-    names: dict[tuple[int, str], str] = {}
+    records = _LOCAL_PLACE.findall(read_text(image.path.with_suffix(".cdb")))
+    names = {(int(at, 16), function): name for function, name, at in records}
     places: dict[int, tuple[int, int]] = {}
     for first, end in map_overlays(read_text(image.path.with_suffix(".map"))):
         places.update((place, (LOCAL, place)) for place in range(first, min(end, _IRAM_BYTES)))
@@ -101,10 +105,11 @@ def _shared(image: Image) -> tuple[dict[int, tuple[int, int]], dict[tuple[int, s
         if _PARAMETER in name and one.space == "iram":
             end = min([at for at in in_ram if at > one.address], default=_IRAM_BYTES)
             size = min(end - one.address, _MOST_PARAMETER_BYTES)
-            function = name.removeprefix("_").partition(_PARAMETER)[0]
+            function, _, number = name.removeprefix("_").partition(_PARAMETER)
+            known = names.get((one.address, function), f"parameter {number}")
             for place in range(one.address, one.address + size):
                 places[place] = LOCAL, place
-                names[place, function] = name.removeprefix("_")
+                names[place, function] = known
     return places, names
 
 

@@ -198,3 +198,12 @@ def test_a_name_or_a_line_beyond_any_memory_is_no_record(address, found):
         f"S:G$far$0_0$0({{2}}DF,SV:S),C,0,0\nL:G$far$0$0:{short}\nL:XG$far$0$0:{short}\nL:C$a.c$7$1$1:{short}\n"
     )
     assert [bool(part) for part in (cdb.names, cdb.begins, cdb.ends, cdb.lines)] == [found] * 4
+
+
+def test_a_bit_is_no_byte_of_ram_whatever_its_area_says_of_itself():
+    """Linkers write the area of bits with and without the word BIT."""
+    for attributes in ("REL,CON", "REL,CON,BIT"):
+        page = f"BSEG  00000000  00000003 =  3. bytes ({attributes})\n"
+        assert (
+            parse_map(f"{page}     00000000  _at_most_PARM_2   b\n").names["_at_most_PARM_2"].space == "bit"
+        )

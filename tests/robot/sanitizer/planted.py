@@ -260,3 +260,73 @@ void main(void)
 """,
 }
 """Programs without a mistake."""
+
+
+AGAIN = """\
+#include <8052.h>
+volatile unsigned int now;
+volatile unsigned long clock;
+volatile __xdata unsigned int far;
+unsigned int copy, before;
+unsigned long longer;
+
+void tick(void) __interrupt(1)
+{
+    TH0 = 0xFE;
+    now++;
+    clock++;
+    far++;
+}
+
+unsigned int get(void)
+{
+    unsigned int first;
+    do
+        first = now;
+    while (first != now);
+    return first;
+}
+
+unsigned int twice(void)
+{
+    unsigned int first, second;
+    do {
+        first = now;
+        second = now;
+    } while (first != second);
+    return first;
+}
+
+void main(void)
+{
+    TMOD = 0x21;
+    TH0 = 0xFE;
+    TR0 = 1;
+    ET0 = 1;
+    EA = 1;
+    for (;;) {
+        copy = get();
+        copy = twice();
+        do
+            copy = now;
+        while (copy != now);
+        do
+            longer = clock;
+        while (longer != clock);
+        do {
+            copy = far;
+        }
+        while (copy != far);
+        do
+            copy = now; /* race now */
+        while (copy == before);
+        copy = now; /* race now */
+        if (copy != now) /* race now */
+            P1_0 = 1;
+        do
+            copy = now; /* race now */
+        while ((unsigned char)copy != (unsigned char)now);
+    }
+}
+"""
+"""A variable is read until two values are equal; and what only looks like that."""

@@ -9,17 +9,19 @@ from miro_robot.inspect.sanitizer_layout import layout_of
 from miro_robot.inspect.watcher import attach
 from miro_robot.mcs51.cpu import Cpu
 from tests.robot.inspect.programs import build
-from tests.robot.sanitizer.planted import OVERLAID, OVERLAYS, RACES, SILENT, TIMES, planted
+from tests.robot.sanitizer.lines import receive
+from tests.robot.sanitizer.planted import AGAIN, OVERLAID, OVERLAYS, RACES, SILENT, TIMES, planted
 from tests.states import snapshot
 
 
-def watched(path, cycles):
-    """Findings of an image that ran for so long, and the CPU."""
+def watched(path, cycles, received=b""):
+    """Findings of an image that ran for so long, and the CPU; `received` comes at 9600 baud, from 1 ms on."""
     image = load_hex(path)
     cpu, layout = Cpu(), layout_of(image)
     cpu.load(image.code, image.used)
     sanitizer = Sanitizer(layout)
     attach(cpu, sanitizer)
+    receive(cpu, received)
     cpu.run(cycles)
     return Reader(image, layout).findings(sanitizer), cpu
 
@@ -57,6 +59,7 @@ def test_bytes_that_functions_share_are_found_where_an_interrupt_uses_them(tmp_p
     found, _ = watched(build(tmp_path, OVERLAYS), 60_000)
     assert {one.kind for one in found} == {"overlay"}
     assert {one.function for one in found} == OVERLAID
+    assert {f"{one.says}" for one in found} >= {"stores b for mix", "stores parameter 2 for _moduint"}
 
 
 @pytest.mark.parametrize("program", SILENT.values(), ids=SILENT)
@@ -64,6 +67,26 @@ def test_nothing_is_found(program, tmp_path):
     found, cpu = watched(build(tmp_path, program), 200_000)
     assert found == []
     assert cpu.peripherals.timers.control & 0x10  # it came to its loop
+
+
+def test_what_is_read_until_it_is_equal_is_not_torn(tmp_path):
+    found, _ = watched(build(tmp_path, AGAIN), 100_000)
+    assert {one.key for one in found} == planted(AGAIN)
+
+
+def test_firmware_that_never_reads_sbuf_is_told_apart(tmp_path):
+    """In both, characters come to a busy receiver; one reads them too late."""
+    says = {}
+    for late in ("", "if (RI && ++turns == 900) { turns = 0; x = SBUF; RI = 0; }"):
+        (folder := tmp_path / f"{len(late)}").mkdir()
+        text = "#include <8052.h>\nunsigned int turns, x;\nvoid main(void) { SCON = 0x50; TMOD = 0x20; PCON = 0x80;"
+        text += f" TH1 = 0xF3; TR1 = 1; for (;;) {{ {late} }} }}"
+        found, _ = watched(build(folder, text), 20_000, b"abcdefgh")
+        (says[late],) = (one.says for one in found)
+    assert [*says.values()] == [
+        "never reads SBUF, where characters come, in main",
+        "loses a character: the one before was still waiting, in main",
+    ]
 
 
 def test_a_timer_that_starts_early_is_not_passed_over(tmp_path):

@@ -7,7 +7,10 @@ from miro_robot.inspect import sanitizer as found
 from miro_robot.inspect.sanitizer import Sanitizer
 from miro_robot.inspect.sanitizer_layout import Layout
 from miro_robot.inspect.watcher import attach
+from miro_robot.mcs51.cpu import Cpu
+from tests.robot.mcs51.asm import assemble
 from tests.robot.mcs51.rig import cpu_with
+from tests.robot.sanitizer.lines import receive
 
 PUT_GENERIC = 0x200
 
@@ -17,13 +20,7 @@ def mistakes(text, cycles=3000, ram=-1, received=b""):
     cpu = cpu_with(text)
     watcher = Sanitizer(Layout({}, {}, {}, {}, set(), PUT_GENERIC, DebugInfo()), ram)
     attach(cpu, watcher)
-    bit, tick = 2500, 24_000
-    for byte in received:
-        for level in (0, *(byte >> number & 1 for number in range(8)), 1):
-            cpu.rxd.append(tick, level)
-            tick += bit
-    if received:
-        cpu.rxd.settled_tick = 1 << 60
+    receive(cpu, received)
     cpu.run(cycles)
     return {(mistake, which) for mistake, _, _, which in watcher.notes}
 
@@ -64,6 +61,10 @@ end_of_interrupt:
         ("PUSH ACC\n INC A\n POP ACC\n RETI", set()),
         ("RET", {(found.RET_OF_INTERRUPT, 1)}),
         ("LCALL end_of_interrupt\n RETI", set()),  # lowers its level
+        ("LCALL end_of_interrupt\n RET", set()),
+        ("LCALL sub\n LCALL end_of_interrupt\n RET", set()),
+        ("MOV 32h,#lo\n PUSH 32h\n PUSH 33h\n RETI\nlo:\n RET", set()),  # as RTX51 does
+        ("LCALL end_of_interrupt\n INC R7\n RET", {(found.REGISTERS, 7)}),
         ("LCALL sub\n RETI", set()),
         ("POP 31h\n POP 30h\n PUSH 30h\n PUSH 31h\n RETI", set()),
         ("INC 51h\n RETI", {(found.OVERWRITTEN, 0)}),
@@ -115,6 +116,12 @@ ODD = "MOV A,R6\n JB ACC.0,odd\n"
         ("INC SP\n LCALL sub", "RET", {(found.LEAK, 0)}),
         ("LCALL sub\naway:\n NOP", "DEC SP\n LJMP away", {(found.LEAK, 0)}),  # half of the return address
         ("LCALL sub\naway:\n NOP", "DEC SP\n DEC SP\n LJMP away", set()),
+        ("LCALL sub\naway:\n NOP", "LJMP away", {(found.LEAK, 0)}),  # all of it
+        ("LCALL middle\naway:\n NOP", "RET\nmiddle:\n LCALL sub\n LJMP away", {(found.LEAK, 0)}),
+        ("LCALL sub\naway:\n NOP", "MOV A,R6\n JB ACC.1,out\n RET\nout:\n LJMP away", {(found.LEAK, 0)}),
+        ("MOV 30h,SP\n LCALL sub\naway:\n NOP", "MOV SP,30h\n LJMP away", set()),  # as longjmp
+        ("MOV R5,#9\n LCALL sub", "DJNZ R5,deeper\n RET\ndeeper:\n LCALL sub\n RET", set()),  # recursion
+        ("LCALL sub\n LCALL other", "RET\nother:\n LJMP sub", set()),  # a call at the end, made a jump
     ],
 )
 def test_calls_and_the_stack(body, sub, wanted):
@@ -220,3 +227,39 @@ def test_halves_of_a_timer(body, wanted):
 )
 def test_memory(text, wanted):
     assert mistakes(f"{text}\nend:\n SJMP end\n ORG 200h\n RET", ram=0x800) == wanted
+
+
+COPY = """
+    MOV DPTR,#{first}
+    MOV R7,#17
+next:
+    CLR A
+    MOVC A,@A+DPTR
+    INC DPTR
+    DJNZ R7,next
+end:
+    SJMP end
+    ORG {there}
+    NOP
+    ORG 200h
+    RET
+"""
+
+
+@pytest.mark.parametrize(
+    ("first", "there", "wanted"),
+    [
+        ("1F0h", "1F0h", []),  # over a gap of 15 bytes
+        ("1F1h", "1F0h", [0x1F1]),  # begins in it
+        ("1B0h", "1B0h", [0x1B1]),  # too long a gap
+        ("200h", "1F0h", [0x201]),  # beyond the end
+    ],
+)
+def test_a_block_that_is_copied_may_have_a_gap(first, there, wanted):
+    code = assemble(COPY.format(first=first, there=there))
+    cpu, watcher = Cpu(), Sanitizer(Layout({}, {}, {}, {}, set(), PUT_GENERIC, DebugInfo()))
+    at = int(there[:-1], 16)
+    cpu.load(code, ((0, 0x20), (at, at + 1), (0x200, 0x201)))
+    attach(cpu, watcher)
+    cpu.run(1000)
+    assert sorted(which for _, _, _, which in watcher.notes)[:1] == wanted
