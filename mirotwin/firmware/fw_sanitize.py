@@ -47,8 +47,8 @@ def sanitize(options: SanitizeOptions) -> int:
     run = open_window(options)
     image = with_debug_files(run.image)
     layout = layout_of(image)
-    if not layout.has_variables:
-        complain(f"{image.path.name}: no .cdb beside it: races and overlays are not observable")
+    if layout.unseen:
+        complain(f"{image.path.name}: {layout.unseen}")
     sanitizer = Sanitizer(layout, ram_of(run.device))
     code = look(run, options, sanitizer)
     found, stale = judged(Reader(image, layout).findings(sanitizer), allowed, options.kinds)

@@ -154,10 +154,8 @@ class Sanitized:
         if image.code not in self._readers:
             known = with_debug_files(image)
             reader = self._readers[image.code] = Reader(known, layout_of(known))
-            if not reader.layout.has_variables:
-                self.unseen[
-                    f"{known.path.name}: no .cdb beside it: races and overlays are not observable"
-                ] = None
+            if reader.layout.unseen:
+                self.unseen[f"{known.path.name}: {reader.layout.unseen}"] = None
         return self._readers[image.code]
 
 

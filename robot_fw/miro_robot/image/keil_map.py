@@ -15,7 +15,9 @@ from __future__ import annotations
 
 import bisect
 import re
+from collections.abc import Iterator
 from functools import lru_cache
+from itertools import pairwise
 from pathlib import Path
 
 import msgspec
@@ -51,12 +53,15 @@ class KeilSegment(msgspec.Struct, frozen=True):
 
 
 class KeilMap(msgspec.Struct, frozen=True, eq=False):
-    """`functions`: name, first, end. `map_file`: names, and where functions begin, as of SDCC's map."""
+    """`functions`: name, first, end. `map_file`: names, and where functions begin, as of SDCC's map.
+    `variables`: space, first, size and name of globals and statics; the size is up to the next or the segment's end.
+    """
 
     map_file: MapFile
     segments: tuple[KeilSegment, ...]
     lines: tuple[tuple[int, SourceLine], ...]
     functions: tuple[tuple[str, int, int], ...]
+    variables: tuple[tuple[str, int, int, str], ...] = ()
 
     def extents(self, name: str) -> list[tuple[int, int]]:
         """(first, end) of the segments whose names begin so."""
@@ -115,7 +120,7 @@ class _Reader:
 
     NOT_STATE = (  # a reader belongs to no world
         *("files", "segments", "codes", "publics", "statics", "lines", "begun"),
-        *("module", "function", "depth"),
+        *("module", "function", "depth", "data"),
     )
 
     def __init__(self) -> None:
@@ -126,6 +131,9 @@ class _Reader:
         self.statics: dict[str, Symbol] = {}
         self.lines: list[tuple[int, str, int]] = []
         self.begun: dict[tuple[str, str], int] = {}  # module, function: its first line's address
+        self.data: dict[
+            tuple[str, str, int], str
+        ] = {}  # module, space, address -> name; statics of functions, too
         self.module = self.function = ""
         self.depth = 0
 
@@ -163,6 +171,8 @@ class _Reader:
             self.place(kind, name, memory, int(digits, 16) & 0xFFFF, bit)
 
     def place(self, kind: str, name: str, memory: str, address: int, bit: str | None) -> None:
+        if kind in ("PUBLIC", "SYMBOL") and bit is None and _SPACES.get(memory, "iram") != "code":
+            self.data.setdefault((self.module.upper(), _SPACES.get(memory, "iram"), address), name)
         if kind in ("LINE#", "LINE"):
             if name.isdecimal():
                 self.lines.append((address, self.module, int(name)))
@@ -197,7 +207,18 @@ class _Reader:
         ]
         places = sorted((place for place, _ in placed), key=lambda place: place.address)
         functions = tuple((place.name, place.address, end) for place, end in placed)
-        return KeilMap(MapFile(names, tuple(places), ()), tuple(self.segments), tuple(lines), functions)
+        map_file = MapFile(names, tuple(places), ())
+        return KeilMap(map_file, tuple(self.segments), tuple(lines), functions, tuple(self.variables()))
+
+    def variables(self) -> Iterator[tuple[str, int, int, str]]:
+        for segment in self.segments:
+            kind, _, module = segment.name.removeprefix("?").partition("?")
+            space = {"DT": "iram", "ID": "iram", "XD": "xram"}.get(kind)
+            if space is not None and "?" not in module:
+                known = [key[2] for key in self.data if key[:2] == (module, space)]
+                begins = sorted(at for at in known if segment.first <= at < segment.end)
+                for first, end in pairwise([*begins, segment.end]):
+                    yield space, first, end - first, self.data[module, space, first]
 
     def function_in(
         self, number: int, segment: KeilSegment, code: list[tuple[int, str]]

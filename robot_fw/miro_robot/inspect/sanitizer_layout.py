@@ -10,10 +10,11 @@ import msgspec
 from miro_robot.image import Image
 from miro_robot.image.c_types import CType, Fields
 from miro_robot.image.debug_info import DebugInfo
+from miro_robot.image.keil_map import KeilMap, keil_map
 from miro_robot.image.symbol_files import map_overlays, read_text
 from miro_robot.image.variables import variables_of
 from miro_robot.inspect.writes import READS_BY_ROW, written_form
-from miro_robot.mcs51.opcodes import ROW
+from miro_robot.mcs51.opcodes import LENGTH, ROW
 
 SCALAR, LOCAL = 1, 2
 """A byte of a variable that the whole program has; of parameters, local variables, and what functions share."""
@@ -22,6 +23,7 @@ XRAM = _IRAM_BYTES = 256
 """Places from here on are external RAM."""
 _INDIVISIBLE = {0x05, 0x06, 0x15, 0x16, 0x42, 0x43, 0x52, 0x53, 0x62, 0x63, 0xC5, 0xC6, 0xD5, 0xD6}  # rows
 _IMMEDIATE = {0x75, 0x76}
+_DPTR, _INC_DPTR, _LONGEST = 0x90, 0xA3, 4
 _PARAMETER = "_PARM_"
 _MOST_PARAMETER_BYTES = 4
 _LOCAL_PLACE = re.compile(r"^L:L\w+\.(\w+)\$(\w+)\$\w+\$\w+:([0-9A-F]{1,8})$", re.MULTILINE)
@@ -43,7 +45,7 @@ class Layout(msgspec.Struct, frozen=True, eq=False):
     """`lines`: instruction -> a number of its C line; `places`: place -> (kind, key), of which a scalar's bytes share
     one, its first place; `names`: key -> the variable's name; `local_names`: (key, function) -> the name there;
     `elements`: keys of numbers in arrays; `put_generic`:
-    where SDCC's store through a generic pointer is, -1 without it.
+    where SDCC's store through a generic pointer is, -1 without it; `by_map`: a Keil map names the variables.
     """
 
     lines: dict[int, int]
@@ -53,11 +55,15 @@ class Layout(msgspec.Struct, frozen=True, eq=False):
     elements: set[int]
     put_generic: int
     debug: DebugInfo
+    by_map: bool = False
 
     @property
-    def has_variables(self) -> bool:
-        """True if C variables are known: Keil's maps have lines, and no sizes of variables."""
-        return bool(self.names or self.local_names)
+    def unseen(self) -> str:
+        """What cannot be observed without a .cdb; "" with one."""
+        if self.by_map:
+            return "no .cdb beside it: variables are as long as its map leaves room, and overlays are not observable"
+        known = self.names or self.local_names
+        return "" if known else "no .cdb beside it: races and overlays are not observable"
 
 
 def layout_of(image: Image) -> Layout:
@@ -88,8 +94,39 @@ def layout_of(image: Image) -> Layout:
             names[base + offset] = name
             if variable.type.kind == "array":
                 elements.add(base + offset)
+    keil = None if kept or places else keil_map(image.path)
+    for base, size, name in () if keil is None else _of_keil(image, keil, lines):
+        places |= dict.fromkeys(range(base, base + size), (SCALAR, base))
+        names[base] = name
     put = image.symbols.names.get(_PUT_GENERIC)
-    return Layout(lines, places, names, local_names, elements, -1 if put is None else put.address, debug)
+    at = -1 if put is None else put.address
+    return Layout(lines, places, names, local_names, elements, at, debug, keil is not None and bool(names))
+
+
+def _of_keil(image: Image, keil: KeilMap, lines: dict[int, int]) -> Iterator[tuple[int, int, str]]:
+    """(place, size, name) of bytes, and of numbers of 2 to 4 bytes: what one line of C takes all bytes of, by their own
+    addresses. The others are arrays or structs.
+    """
+    touched: dict[int, set[int]] = {}
+    code, at, dptr = image.code + bytes(2), 0, -1
+    while at < len(image.code):
+        number, length = lines.get(at), LENGTH[code[at]]
+        if number is None:
+            at += 1
+            continue
+        within = touched.setdefault(number, set())
+        within |= {code[at + form] for form in (READS[code[at]], WRITES[code[at]]) if form in (1, 2)}
+        dptr = code[at + 1] << 8 | code[at + 2] if code[at] == _DPTR else dptr + (code[at] == _INC_DPTR)
+        within.add(XRAM + dptr)
+        at = next((at + more for more in range(1, length) if lines.get(at + more) != number), at + length)
+    words = [one for one in touched.values() if len(one) > 1]
+    for space, first, size, name in keil.variables:
+        base, room = (first + XRAM, XRAM + 0x10000) if space == "xram" else (first, _IRAM_BYTES)
+        bytes_of_it = {*range(base, base + size)}
+        if base + size <= room and (
+            size == 1 or (size <= _LONGEST and any(bytes_of_it <= one for one in words))
+        ):
+            yield base, size, name
 
 
 def _shared(image: Image) -> tuple[dict[int, tuple[int, int]], dict[tuple[int, str], str]]:

@@ -9,6 +9,8 @@ from miro_robot.inspect.sanitizer_layout import layout_of
 from miro_robot.inspect.watcher import attach
 from miro_robot.mcs51.cpu import Cpu
 from tests.robot.inspect.programs import build
+from tests.robot.mcs51.asm import assemble, hex_text
+from tests.robot.sanitizer import keil
 from tests.robot.sanitizer.lines import receive
 from tests.robot.sanitizer.planted import AGAIN, OVERLAID, OVERLAYS, RACES, SILENT, TIMES, planted
 from tests.states import snapshot
@@ -87,6 +89,28 @@ def test_firmware_that_never_reads_sbuf_is_told_apart(tmp_path):
         "never reads SBUF, where characters come, in main",
         "loses a character: the one before was still waiting, in main",
     ]
+
+
+def test_a_map_of_keil_names_variables_and_a_line_that_takes_both_bytes_makes_a_word(tmp_path):
+    """Bytes that are reached through R0 are an array's; an update with interrupts off is right."""
+    (tmp_path / "clock.m51").write_text(keil.MAP)
+    (tmp_path / "clock.hex").write_text(hex_text(assemble(keil.CODE)))
+    found, _ = watched(tmp_path / "clock.hex", 20_000)
+    assert {one.key for one in found} == {"race clock.c:12 ms", "race clock.c:15 count"}
+    layout = layout_of(load_hex(tmp_path / "clock.hex"))
+    assert layout.names == {0x08: "ms", 0x0A: "copy", 0x0C: "count"}
+    for damage in ("D:000DH         PUBLIC", "X:FFFFH         PUBLIC"):
+        map_text = keil.MAP.replace("D:000DH         PUBLIC", damage).replace(
+            "0008H     0008H     UNIT", "0008H     FFFFH     UNIT"
+        )
+        (tmp_path / "clock.m51").write_text(
+            map_text.replace(
+                "IDATA   0021H     0001H     UNIT         ?STACK",
+                "XDATA   FFFFH     00FFH     UNIT         ?XD?CLOCK",
+            )
+        )
+        assert all(place < 256 for place in layout_of(load_hex(tmp_path / "clock.hex")).places), damage
+    assert "variables are as long as its map leaves room" in layout.unseen
 
 
 def test_a_timer_that_starts_early_is_not_passed_over(tmp_path):
