@@ -1,9 +1,9 @@
 """Converts transmissions to inputs that a target reads back as the same, and defines a campaign's first inputs.
 
 In `session` pauses keep their length to within a step, and frames become operations, so that a fuzzer changes their
-content and not their CRC. Characters outside a frame stay characters. Telemetry, robots' answers, switched supplies and
-radios, and bad stop bits of characters outside a frame are left out: a session has no operation for them. `frames`
-contains frames only, `bytes` no pauses.
+content and not their CRC. Characters outside a frame stay characters. Telemetry, robots' answers, hardware faults,
+switched supplies and radios, and bad stop bits of characters outside a frame are left out: no operation is made for
+them. `frames` contains frames only, `bytes` no pauses.
 
 Eight random bytes alone never get past the synchronisation, so a campaign begins with frames: each kind of frame that a
 host may send, once. A seed is short, and each makes a robot react differently. Tokens are words for AFL++.

@@ -359,7 +359,7 @@ class Board(ProcessorBoard):
             self._set_pins(0, value, start + _DATA)
             self._set_pins(3, self.bank[3] & (0xFF ^ _WR), start + _STROBE)
             # /WR rises on the tick on which the latches take their bytes: chips are driven once, with both.
-            self.bank[3] |= _WR
+            self.bank[3] |= _WR & ~self.low_pins[3]
             changed = True
         for index in range(self.latches):
             if address & self.latch_mask[index] == self.latch_address[index]:

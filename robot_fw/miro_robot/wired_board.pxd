@@ -18,7 +18,7 @@ cdef class WiredBoard(EmptyBoard):
     cdef long long horizon
     cdef unsigned char outside[4]
     cdef int pushed[4]
-    cdef int on_bus
+    cdef int on_bus, stuck
     cdef readonly int drives_rxd, outputs
     cdef int output_levels[4]
     cdef long long output_ticks[3]
@@ -75,5 +75,7 @@ cdef class WiredBoard(EmptyBoard):
     cdef int _push_port(self, int port, int levels, long long tick) except -1
     @cython.locals(net=int)
     cdef _judge(self, long long tick)
+    @cython.locals(port=int)
+    cdef int _note_stuck(self) except -1
     cdef _note_faults(self, long long tick)
     cdef _supply(self, int on, long long tick)

@@ -68,7 +68,7 @@ class WiredBoard(EmptyBoard):
     STATE = {"latched": ("8B", 0, 0xFF), "outside": ("4B", 0, 0xFF), "parts": [Part]}
     NOT_HASHED: tuple[str, ...] = ("outside",)
     NOT_STATE = (
-        *("nets", "horizon", "part_index", "pushed", "starved", "on_bus", "drives_rxd"),
+        *("nets", "horizon", "part_index", "pushed", "starved", "on_bus", "drives_rxd", "stuck"),
         # follow from the peripherals
         *("outputs", "output_levels", "output_ticks", "output_tick", "output_put"),
         *("latch_count", "latch_address", "latch_mask", "buffer_count", "buffer_address", "buffer_mask"),
@@ -91,6 +91,7 @@ class WiredBoard(EmptyBoard):
         self.outside = [0xFF] * 4
         self.pushed = [0xFF] * 4  # what the CPU was given of the ports
         self.starved: list[FirmwareFault] = []
+        self.stuck = 0  # a port pin that something is wired to is shorted
         wired = self.nets.wired
         self.on_bus = 1 if wired[0] or wired[2] or wired[3] & (_WR | _RD) else 0
         self.drives_rxd = int(self.nets.is_output(self.nets.number("P3.0")))
@@ -404,6 +405,8 @@ class WiredBoard(EmptyBoard):
     def _judge(self, tick: int) -> None:
         """Contention is a fault where it begins. RST and the supply move pins one after the other: judged after."""
         for net in self.nets.judge():
+            if self.stuck:  # a shorted pin's, not the firmware's
+                continue
             detail = ""
             if len(self.faults) < FAULTS_KEPT:  # of the others nobody sees it
                 detail = f"net {self.nets.names[net]}: {' and '.join(self.nets.drivers(net))}"
@@ -414,7 +417,7 @@ class WiredBoard(EmptyBoard):
         faults = sorted(self.nets.faults, key=_order_and_kind)
         self.nets.faults = []
         before = None
-        no_fault = self.forced or self.is_stuck()  # a shorted pin's, not the firmware's
+        no_fault = self.forced or self.stuck  # a shorted pin's, not the firmware's
         for order, kind, detail, ago in faults:
             if (order, kind) != before and not no_fault:
                 self._note_fault(kind, self.cpu.at, tick - ago, detail)
@@ -457,9 +460,18 @@ class WiredBoard(EmptyBoard):
         tick = self.cpu.cycles * CYCLE_TICKS
         self.sync(tick - 1)
         self._hold_pin(port, bit, level, self.pushed[port] | (_RXD if port == 3 else 0))
+        self._note_stuck()
+        self.forced = 1
         self.nets.tie(8 * port + bit, level)
         self.nets.settle(tick)
         self._push(tick)
+        self.forced = 0
+
+    def _note_stuck(self) -> None:
+        """Of a shorted pin that nothing is wired to no part notices anything."""
+        self.stuck = 0
+        for port in range(4):
+            self.stuck |= (self.stuck_low[port] | self.stuck_high[port]) & self.nets.wired[port]
 
     def value(self, name: str, key: str) -> float | int | bool | str:
         """A value of a part as it is now, of a plain type. Raises PluginError for what no file can hold (NaN,
@@ -551,6 +563,7 @@ class WiredBoard(EmptyBoard):
         for port in range(4):
             self.nets.latches[port] = self.cpu.peripherals.ports.latches[port] & self.output_levels[port]
             self.nets.note_shorts(port, self.stuck_low[port], self.stuck_high[port])
+        self._note_stuck()
         self.nets.powered = self.powered
         self.nets.restart()
         for index in range(self.latch_count):

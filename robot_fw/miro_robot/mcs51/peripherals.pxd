@@ -25,7 +25,7 @@ cdef class Peripherals:
     cdef readonly Shift shift
     cdef readonly Ports ports
     cdef readonly int smod
-    cdef int p1, p3
+    cdef int p1, p3, short1, short3
     cdef public int frozen
     cdef int pulsed
     cdef public long long written
@@ -55,6 +55,7 @@ cdef class Peripherals:
     cdef long long _timer1_tick(self) noexcept
     cdef int push(self, int port, int levels, long long tick) except -1
     cdef int apply_pushes(self, long long now) except -1
+    @cython.locals(ports=Ports, p1=int, p3=int, changed1=int, changed3=int)
     cdef int sample_pins(self, long long cycle) except -1
     @cython.locals(ports=Ports)
     cdef inline void sample_latches(self, long long cycle) noexcept

@@ -52,9 +52,12 @@ class Peripherals:
         "smod": FLAG,
         "p1": ("i", 0, 0xFF),
         "p3": ("i", 0, 0xFF),
+        "short1": ("i", 0, 0xFF),
+        "short3": ("i", 0, 0xFF),
         "frozen": FLAG,
         "p3_reads": TICK,
     }
+    NOT_HASHED = ("short1", "short3")  # a fault: what comes of it is hashed
     NOT_STATE = (
         "bus",
         "has_timer2",
@@ -80,8 +83,10 @@ class Peripherals:
         self.shift = Shift(self.uart)
         self.ports = Ports()
         self.smod = 0
-        self.p1 = 0xFF  # pins as last sampled
+        self.p1 = 0xFF  # pins as last sampled, without shorts
         self.p3 = 0xFF
+        self.short1 = 0  # bits that a short made another level of
+        self.short3 = 0
         self.frozen = 0  # power-down: the oscillator stands
         self.written = 0  # cycle of the last write to P1 or P3, whose pins are sampled later
         self.pulsed = 0  # a timer that counts a pin clocks the serial port
@@ -101,14 +106,14 @@ class Peripherals:
         self.now = cycle
         self.smod = 0
         self.interrupts.clear()
-        self.external.levels = (self.p3 >> 2) & 3  # pins moved on while the oscillator stood
+        self.external.levels = ((self.p3 ^ self.short3) >> 2) & 3  # pins moved on while the oscillator stood
         self.external.write(0, cycle)
         self.timers.clear(cycle)
         self.timer2.clear(cycle)
         self.uart.clear(cycle)
         self.shift.abort(12 * cycle)
         self.timers.set_gates(self.external.levels)
-        self.timer2.up = (self.p1 >> 1) & 1
+        self.timer2.up = ((self.p1 ^ self.short1) >> 1) & 1
         self.look_again()
         self._set_serial_clock()
 
@@ -298,12 +303,16 @@ class Peripherals:
 
     def sample_pins(self, cycle: int) -> None:
         """S5P2 of `cycle`: what timers and interrupts see of P1 and P3."""
-        p1 = self.ports.pins(1)
-        p3 = self.ports.pins(3)
-        changed1 = p1 ^ self.p1
-        changed3 = p3 ^ self.p3
-        self.p1 = p1
-        self.p3 = p3
+        ports = self.ports
+        p1 = ports.pins(1)
+        p3 = ports.pins(3)
+        changed1 = p1 ^ self.p1 ^ self.short1
+        changed3 = p3 ^ self.p3 ^ self.short3
+        # Apart, for the digest: a short that no input notices must change nothing in it.
+        self.p1 = ports.latches[1] & ports.outside[1]
+        self.p3 = ports.latches[3] & ports.outside[3]
+        self.short1 = p1 ^ self.p1
+        self.short3 = p3 ^ self.p3
         # T2, T2EX; INT0, INT1, T0, T1. RXD is not among them: the serial port reads its wire between cycles too.
         if not self.frozen and (changed1 & 0x03 or changed3 & 0x3C):
             self._inputs_changed(changed1, changed3, cycle)
@@ -312,13 +321,13 @@ class Peripherals:
         """Samples bits of P1 and P3 that nothing looks at: each write is seen in the cycle after it, not by `cycle`."""
         if self.written < cycle:
             ports = self.ports
-            self.p1 = self.p1 & 0x03 | ports.pins(1) & 0xFC
-            self.p3 = self.p3 & 0x3F | ports.pins(3) & 0xC0
+            self.p1 = self.p1 & 0x03 | ports.latches[1] & ports.outside[1] & 0xFC
+            self.p3 = self.p3 & 0x3F | ports.latches[3] & ports.outside[3] & 0xC0
             self.written = cycle
 
     def _inputs_changed(self, changed1: int, changed3: int, cycle: int) -> None:
-        p1 = self.p1
-        p3 = self.p3
+        p1 = self.p1 ^ self.short1
+        p3 = self.p3 ^ self.short3
         self.settle(cycle)
         for number in range(2):
             if (changed3 >> (2 + number)) & 1:

@@ -308,6 +308,7 @@ class Wire(Medium):
     def settle(self, rendezvous_tick: int) -> None:
         if self.terminal is None:
             self.board.cpu.rxd.settled_tick = rendezvous_tick + SETTLE_TICKS
+            self.whole.forget(rendezvous_tick + SETTLE_TICKS)  # who mends it looks no further back
 
     def run(self, tick: int) -> bool:
         """The board to `tick`, in pieces from one look of the terminal to the next."""

@@ -8,7 +8,10 @@ from xml.etree import ElementTree
 
 import pytest
 
+from miro_protocol.actions import Fault
 from mirotwin.fuzz.files import CampaignFolder, unused
+from mirotwin.fuzz.spec import TargetSpec
+from mirotwin.fuzz.target import robot_target
 from tests import children
 from tests.mirotwin.conform.mistakes import MISTAKES
 from tests.mirotwin.verify.checks.rig import built, needs_sdcc, own_image, planted
@@ -88,6 +91,19 @@ def test_an_input_that_reaches_a_function_is_left_as_a_stream(mirotwin, engines,
 def test_a_function_that_no_input_reaches_is_said(mirotwin, engines, tmp_path):
     err = mirotwin.ends(1, "fuzz", "--time", "0.3s", "--covering", "give_up", "--out", tmp_path / "out")
     assert "--covering give_up: not reached by " in err
+
+
+def test_inputs_break_hardware_and_cases_hold_the_faults(mirotwin, engines, tmp_path):
+    limit = "wheels_within_m_s={limit_m_s=0.01, overshoot_m_s=0.0}"
+    options = ("--time", "1s", "--seed", "1", "--expect", limit, "--minimise", "0.3s", "--json", "-q")
+    code, out, _ = mirotwin("fuzz", "--faults", *options, "--out", tmp_path / "out")
+    assert code == 1
+    inputs = [path.read_bytes() for path in (tmp_path / "out" / "corpus").iterdir()]
+    target = robot_target(TargetSpec(faults=True))
+    assert any(isinstance(item, Fault) for data in inputs for item in target.script(data))
+    for crash in [case for case in json.loads(out)["cases"][1:] if case["counts"]]:
+        again, _, said = mirotwin(*crash["replay"].split()[1:])
+        assert (again, said.startswith("mirotwin: fails as recorded: ")) == (1, True)
 
 
 def test_a_check_of_ours_judges_each_new_input(mirotwin, engines, tmp_path):

@@ -47,6 +47,8 @@ def test_a_fault_that_changes_something_leaves_the_verdict_to_the_checks(what):
         ("{ pause_ms = 100 }", "wheel left blocked"),
         (DRIVES + ", " + QUIET, "pin P1.0 0"),  # the slot, which is read once
         (DRIVES + ", " + QUIET, "pin P1.7 0"),  # which is wired to nothing
+        (DRIVES + ", " + QUIET, "pin P3.4 0"),  # T0, which counts nothing
+        (DRIVES + ", " + QUIET, "pin P3.7 0"),
     ],
 )
 def test_one_that_changes_nothing_is_not_judged_among_all_that_goes_in(before, what):

@@ -491,3 +491,10 @@ def test_a_short_wins_over_all_drivers_and_is_no_contention(drive, port, level):
     assert board.faults == []
     board.hold_pin(1, 2, -1)
     assert (levels(board), board.nets.external[P1]) == (before, seen)
+
+
+def test_outputs_that_meet_while_a_pin_that_nothing_is_wired_to_is_shorted_are_a_fault():
+    board = one_net(scripted("x", [(5, Q, LOW)]), scripted("y", [(7, Q, HIGH)]), pins=(Q, Q))
+    board.hold_pin(1, 7, 0)
+    board.sync(20)
+    assert [fault.kind.name for fault in board.faults] == ["NET_CONTENTION"]

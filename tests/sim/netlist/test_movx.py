@@ -68,3 +68,17 @@ def test_strobes_on_an_output_latch_do_the_same():
     assert compiled.faults == twin.faults == []
     assert [command[1] for command in twin.left.commands] == [0x02]
     assert compiled.left.commands == twin.left.commands
+
+
+@pytest.mark.parametrize("pin", [6, 7])
+@pytest.mark.parametrize("text", [WRITE, READ])
+def test_strobes_of_a_movx_on_a_shorted_pin_do_the_same(text, pin):
+    spec = rewired(lambda pin, to: {"wr": "P3.6", "rd": "P3.7"}.get(pin, to))
+    twin = NetBoard(Plant(), stop_on_fault=False, image=image_of(text), spec=spec)
+    twin.cpu.rxd.settled_tick = 1 << 60
+    compiled = board_with(text, raw_movx_wiring(), stop_on_fault=False)
+    for board in (compiled, twin):
+        board.hold_pin(3, pin, 0)
+        board.run(3 * MS)
+    assert compiled.left.commands == twin.left.commands
+    assert compiled.cpu.peek_iram(0x40) == twin.cpu.peek_iram(0x40)

@@ -4,8 +4,9 @@ import pytest
 
 from miro_protocol.actions import Fault
 from miro_protocol.transmission import DOWN, Transmission
+from miro_robot.image import load_hex
 from miro_sim.scenario.board import PERIOD_TICKS, BoardScenario
-from miro_sim.scenario.board_file import board_of_table
+from miro_sim.scenario.board_file import board_of_table, load_board
 from miro_sim.world.world import World
 from tests import children
 from tests.robot.mcs51.asm import image_of
@@ -150,3 +151,17 @@ def test_a_pin_that_no_file_says_a_word_of_cannot_be_shorted():
     world = World(BoardScenario(), 0, image_of("SJMP $"))
     with pytest.raises(ValueError, match="no board file says what is wired to the pins"):
         world.do(Fault(world.earliest_action_tick, 0, 0, "pin P1.3 0"))
+
+
+def test_two_outputs_that_meet_because_of_a_short_are_no_fault_of_the_firmware():
+    folder = children.ROOT / "examples" / "boards" / "follower"
+    scenario = BoardScenario(board=load_board(str(folder / "follower.board.toml")))
+    world = World(scenario, 0, load_hex(folder / "follower.ihx"), [])
+    world.do(Fault(585_323, 0, 0, "pin P0.3 1"))  # R/W of the display, which drives its bus from then on
+    world.run_to(scenario.clock // 2)
+    assert (world.faults, world.stopped) == ([], False)
+
+
+def test_edges_that_a_broken_wire_has_carried_are_forgotten():
+    world = echoing(("rxd inverted",), [END])
+    assert world.lines[0].whole.ticks == []
