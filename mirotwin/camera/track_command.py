@@ -20,7 +20,7 @@ from mirotwin.shell.options import JSON, NETWORK, PATH, Engine
 from mirotwin.shell.program import complain, show_line
 
 _DEGREES = 57.29577951308232
-_MOST = len(IDENTITIES) - 1
+_LAST_ROBOT = len(IDENTITIES) - 1
 DEFAULT_NUMBERS = (0, 1, 2)
 HEADING = f"{'frame':>6} {'robot':>6} {'x_cm':>9} {'y_cm':>9} {'heading_deg':>12} {'confidence':>11}  picture"
 
@@ -29,8 +29,8 @@ def robot_numbers(text: str) -> tuple[int, ...]:
     """Numbers of robots, separated by commas."""
     words = [word.strip() for word in text.split(",")]
     for word in words:
-        if word not in [str(number) for number in range(_MOST + 1)]:
-            raise ValueError(f"{word!r} is no robot's number: 0 to {_MOST}, separated by commas.")
+        if word not in [str(number) for number in range(_LAST_ROBOT + 1)]:
+            raise ValueError(f"{word!r} is no robot's number: 0 to {_LAST_ROBOT}, separated by commas.")
         if words.count(word) > 1:
             raise ValueError(f"two robots have the number {word}; name each once.")
     return tuple(map(int, words))

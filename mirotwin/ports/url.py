@@ -54,19 +54,19 @@ def parse_url(url: str) -> UrlOptions:
         if key == "set":
             settings.append(value)
             continue
-        if key not in _MOST:
-            known = ", ".join(["set", *_MOST])
+        if key not in _LIMITS:
+            known = ", ".join(["set", *_LIMITS])
             raise BadInput(url, key, "is no option of the URL", f"there are {known}")
         if key in options:
             raise BadInput(url, key, "stands twice", "give it once")
         try:
-            options[key] = _read(value, _MOST[key])
+            options[key] = _read(value, _LIMITS[key])
         except ValueError as error:
             raise BadInput(url, key, f"{value!r} {error}") from None
     return UrlOptions(scenario, settings=tuple(settings), **options)
 
 
-_MOST: dict[str, int | float | None] = {
+_LIMITS: dict[str, int | float | None] = {
     "seed": MAX_SEED,
     "firmware": None,
     "network": MAX_NETWORKS - 1,
@@ -74,7 +74,7 @@ _MOST: dict[str, int | float | None] = {
     "limit_s": LONGEST_S,
     "out": None,
 }
-"""The options but for `set`, and the most that one may be; None: it is text."""
+"""Option -> largest number; None for text. `set` is read apart."""
 
 
 def _read(value: str, most: float | None) -> str | float:
