@@ -120,14 +120,16 @@ def hidden_by(outcomes: Sequence[Outcome]) -> dict[str, list[str]]:
     for outcome in outcomes:
         if outcome.cause:
             hidden.setdefault(outcome.cause, []).append(outcome.rule)
-    return dict(sorted(hidden.items(), key=lambda one: -len(one[1])))
+    return dict(sorted(hidden.items(), key=lambda item: -len(item[1])))
 
 
 def causes_first(outcomes: Sequence[Outcome], causes: Sequence[str]) -> list[Outcome]:
     """Failed rules that hide others, then other failed ones, those not judged, those that passed, and the rest."""
     verdicts = ("failed", "not judged", "passed", "not observable")
     places = {id: place for place, id in enumerate(causes)}
-    return sorted(outcomes, key=lambda one: (verdicts.index(one.verdict), places.get(one.rule, len(places))))
+    return sorted(
+        outcomes, key=lambda outcome: (verdicts.index(outcome.verdict), places.get(outcome.rule, len(places)))
+    )
 
 
 def begin_with(cause: Outcome, hidden: Sequence[str]) -> str:
@@ -145,7 +147,7 @@ def _rules(ids: Sequence[str]) -> str:
 def _where(cause: Outcome) -> str:
     """The network size in which alone the rule fails, if it was tried in others too."""
     topologies = find(cause.rule).topologies
-    failed = {topologies[one.network].robots for one in cause.failures if not one.fault}
+    failed = {topologies[failure.network].robots for failure in cause.failures if not failure.fault}
     if len(failed) == 1 and len({topology.robots for topology in topologies}) > 1:
         return f" where N = {failed.pop()}"
     return ""
@@ -223,22 +225,22 @@ def conform(options: ConformOptions) -> int:
             for outcome in tried:
                 outcomes.append(outcome)
                 bar.to(len(outcomes))
-                for one in watching.take():
-                    if one.cause not in seen or (one.did and not seen[one.cause][0].did):
-                        seen[one.cause] = one, outcome
+                for each in watching.take():
+                    if each.cause not in seen or (each.did and not seen[each.cause][0].did):
+                        seen[each.cause] = each, outcome
                 if artifacts is not None and not unwritten:
                     unwritten = _keep(outcome.cases, artifacts, firmware)
         except BadInput as error:  # a robot that was lost: outcomes before that are reported
             lost = error
     if lost is not None and not outcomes:
         raise lost
-    findings, stale = judged([one for one, _ in seen.values()], allowed, options.sanitizer.kinds)
-    trials = [seen[one.cause][1] for one in findings]
+    findings, stale = judged([each for each, _ in seen.values()], allowed, options.sanitizer.kinds)
+    trials = [seen[each.cause][1] for each in findings]
     if artifacts is not None:
-        sent = [(case_names(find(one.rule))[2], one.sent) for one in trials]
+        sent = [(case_names(find(each.rule))[2], each.sent) for each in trials]
         unwritten = unwritten or _keep(sent, artifacts, firmware)
     outcomes = with_faults(outcomes, rules)
-    cured = [one.rule for one in outcomes if one.rule in known and one.verdict == "passed"]
+    cured = [each.rule for each in outcomes if each.rule in known and each.verdict == "passed"]
     if options.baseline is not None and options.write_baseline and lost is None:
         known = baseline.write(options.baseline, known, outcomes)
     image = None if at_port else firmware
@@ -249,7 +251,7 @@ def conform(options: ConformOptions) -> int:
         rule_cases.found(finding, trial.rule, options.line_for(trial.rule, sanitized=True))
         for finding, trial in zip(findings, trials, strict=True)
     ]
-    verdict = judge((rule_cases.verdict, *(one.verdict for one in found_cases)))
+    verdict = judge((rule_cases.verdict, *(each.verdict for each in found_cases)))
     reported = options.as_json or junit is not None  # then a failure runs once more, for its place
     cases = (*rule_cases.cases(), *found_cases) if reported else ()
     results = Results(command="conform", cases=cases, verdict=verdict, facts=properties)
@@ -264,7 +266,7 @@ def conform(options: ConformOptions) -> int:
     if unwritten:
         complain(unwritten)
     _report_faults(outcomes)
-    complain(*watching.unseen, *(stale_line(options.sanitizer.allow, one) for one in stale))
+    complain(*watching.unseen, *(stale_line(options.sanitizer.allow, each) for each in stale))
     complain(*(line for case in found_cases for line in case.lines))
     results.write_junit(junit)  # reported first: the file may fail
     if lost is not None:
@@ -354,9 +356,11 @@ def _counts(outcomes: Sequence[Outcome], known: Collection[str]) -> str:
     verdicts = [outcome.verdict for outcome in outcomes]
     tried = amount(len(outcomes), "rule")
     text = f"{tried}: {verdicts.count('passed')} passed, {verdicts.count('failed')} failed"
-    expected = [one for one in outcomes if one.rule in known and one.failures]
+    expected = [outcome for outcome in outcomes if outcome.rule in known and outcome.failures]
     text += f" ({len(expected)} of them known)" * bool(expected)
-    others = [f", {verdicts.count(one)} {one}" for one in ("not judged", "not observable") if one in verdicts]
+    others = [
+        f", {verdicts.count(word)} {word}" for word in ("not judged", "not observable") if word in verdicts
+    ]
     return text + "".join(others)
 
 

@@ -63,11 +63,13 @@ class RuleCases:
     def verdict(self) -> Verdict:
         """The verdict over all rules. A firmware fault counts unless the rule against it is known to fail."""
         known = {kind for id in self._known for kind in find(id).faults}
-        faults = [fault for one in self._outcomes for _, _, fault in one.faults if fault.kind not in known]
+        faults = [
+            fault for outcome in self._outcomes for _, _, fault in outcome.faults if fault.kind not in known
+        ]
         verdicts: list[Verdict] = ["fault"] * bool(faults)
-        for one in self._outcomes:
-            does_not: Verdict = "passed" if one.rule in self._known else "not observable"
-            verdicts.append(one.verdict if counts(one, self._named, self._known) else does_not)
+        for outcome in self._outcomes:
+            does_not: Verdict = "passed" if outcome.rule in self._known else "not observable"
+            verdicts.append(outcome.verdict if counts(outcome, self._named, self._known) else does_not)
         return judge(verdicts)
 
     def found(self, finding: Finding, rule: str, reproduce: str) -> TestCase:

@@ -51,22 +51,25 @@ def sanitize(options: SanitizeOptions) -> int:
         complain(f"{image.path.name}: {layout.unseen}")
     sanitizer = Sanitizer(layout, ram_of(run.device))
     code = look(run, options, sanitizer)
-    found, stale = judged(Reader(image, layout).findings(sanitizer), allowed, options.kinds)
+    findings, stale = judged(Reader(image, layout).findings(sanitizer), allowed, options.kinds)
     slot = -1 if options.slot is None else options.slot
-    found = [msgspec.structs.replace(one, network=options.network or 0, slot=slot) for one in found]
+    findings = [
+        msgspec.structs.replace(finding, network=options.network or 0, slot=slot) for finding in findings
+    ]
     subject = {name: getattr(options, name) for name in SubjectOptions.__struct_fields__ if name != "engine"}
-    lines = [_DebugLine(**subject, at=f"{one.tick}t").command_line() for one in found]
+    lines = [_DebugLine(**subject, at=f"{finding.tick}t").command_line() for finding in findings]
     complain(*(stale_line(options.allow, entry) for entry in stale))
     if options.as_json:
         shown = [
-            {**msgspec.structs.asdict(one), "debug": line} for one, line in zip(found, lines, strict=True)
+            {**msgspec.structs.asdict(finding), "debug": line}
+            for finding, line in zip(findings, lines, strict=True)
         ]
-        click.echo(json_bytes({"findings": shown, "not_found": [one.key for one in stale]}, indent=2))
+        click.echo(json_bytes({"findings": shown, "not_found": [finding.key for finding in stale]}, indent=2))
     else:
-        for one, line in zip(found, lines, strict=True):
-            show_line(f"{one}")
+        for finding, line in zip(findings, lines, strict=True):
+            show_line(f"{finding}")
             show_line(f"    {line}")
-        if not found:
+        if not findings:
             show_line("nothing found")
-    worst = exit_code(*(line_of(one)[0] for one in found))
-    return code if code == VERDICTS["fault"].code or not found else worst
+    worst = exit_code(*(line_of(finding)[0] for finding in findings))
+    return code if code == VERDICTS["fault"].code or not findings else worst

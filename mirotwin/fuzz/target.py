@@ -149,7 +149,7 @@ class Target(ABC):
 
     def describe(self, data: bytes) -> str:
         """An input as lines, one for each piece that the processor receives."""
-        return "\n".join(described(one) for one in self.script(data))
+        return "\n".join(described(item) for item in self.script(data))
 
 
 def described(item: ScriptItem) -> str:
@@ -198,14 +198,14 @@ class Breaker:
         self.board, self.oracle = board, oracle
 
     def put(self, which: int, value: int, tick: int) -> None:
-        what = fault_of(which, value)
-        break_board(self.board, what)
-        word, *values = what.split()
+        fault = fault_of(which, value)
+        break_board(self.board, fault)
+        word, *values = fault.split()
         if word in ("motor", "wheel"):
             plant: Any = self.board.plant
             bit = 1 << 2 * (word == "wheel") + (values[0] == "right")
             plant.stopped = plant.stopped & ~bit if values[1] == "ok" else plant.stopped | bit
-        if what == "power dip":
+        if fault == "power dip":
             self.oracle.restarted(tick)
 
 

@@ -81,11 +81,15 @@ def judged(
     findings: Sequence[Finding], allowed: Sequence[Allowed], kinds: Sequence[str] = ()
 ) -> tuple[list[Finding], list[Allowed]]:
     """The findings that nothing allows, and what is allowed and was not found."""
-    wanted = [one for one in findings if not kinds or one.kind in kinds]
-    fits = {one: [each for each in wanted if f"{each.key} ".startswith(f"{one.key} ")] for one in allowed}
+    wanted = [finding for finding in findings if not kinds or finding.kind in kinds]
+    fits = {
+        entry: [each for each in wanted if f"{each.key} ".startswith(f"{entry.key} ")] for entry in allowed
+    }
     meant = {each.key for several in fits.values() for each in several}
-    stale = [one for one in allowed if not fits[one] and (not kinds or one.key.partition(" ")[0] in kinds)]
-    return [one for one in wanted if one.key not in meant], stale
+    stale = [
+        entry for entry in allowed if not fits[entry] and (not kinds or entry.key.partition(" ")[0] in kinds)
+    ]
+    return [finding for finding in wanted if finding.key not in meant], stale
 
 
 def place_of(finding: Finding) -> dict[str, Any]:
@@ -139,8 +143,8 @@ class Sanitized:
     def take(self) -> list[Finding]:
         """What was found since the last time, one for each cause."""
         self._settle()
-        found, self._found = [*self._found.values()], {}
-        return sorted(found, key=lambda one: (not one.did, one))
+        findings, self._found = [*self._found.values()], {}
+        return sorted(findings, key=lambda finding: (not finding.did, finding))
 
     def _settle(self) -> None:
         pending, self._pending = self._pending, []

@@ -41,12 +41,12 @@ class SanitizedSession:
 
     @pytest.hookimpl(trylast=True)
     def pytest_runtest_teardown(self, item: pytest.Item) -> None:
-        found, stale = judged(self.watching.take(), self.allowed, self.kinds)
-        self.used |= {one.number for one in self.allowed if one not in stale}
-        self._add((one.key, line_of(one)[1], item.nodeid) for one in found)
+        findings, stale = judged(self.watching.take(), self.allowed, self.kinds)
+        self.used |= {entry.number for entry in self.allowed if entry not in stale}
+        self._add((finding.key, line_of(finding)[1], item.nodeid) for finding in findings)
 
-    def _add(self, found: Iterable[tuple[str, str, str]]) -> None:
-        for key, line, test in found:
+    def _add(self, findings: Iterable[tuple[str, str, str]]) -> None:
+        for key, line, test in findings:
             if key not in self.found or (line.startswith("did") and not self.found[key][0].startswith("did")):
                 self.found[key] = line, test
 
@@ -64,15 +64,15 @@ class SanitizedSession:
 
     @pytest.hookimpl(optionalhook=True)
     def pytest_testnodedown(self, node: Any) -> None:
-        found, used = getattr(node, "workeroutput", {}).get(OUTPUT, ((), ()))
-        self._add(found)
+        findings, used = getattr(node, "workeroutput", {}).get(OUTPUT, ((), ()))
+        self._add(findings)
         self.used.update(used)
 
     def pytest_terminal_summary(self, terminalreporter: Any) -> None:
         if hasattr(self.config, "workeroutput"):
             return
         terminalreporter.section("sanitizer")
-        stale = [stale_line(self.path, one) for one in self.allowed if one.number not in self.used]
+        stale = [stale_line(self.path, entry) for entry in self.allowed if entry.number not in self.used]
         for line in (*self.watching.unseen, *stale):
             terminalreporter.write_line(line)
         for line, test in sorted(self.found.values()):

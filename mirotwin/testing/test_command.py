@@ -49,21 +49,21 @@ def test(options: TestOptions) -> int:
     files = collect(options.paths)
     chosen = [file for file in files if word.lower() in file.lower()]
     if not chosen:
-        what = (
+        problem = (
             f"{amount(len(files), 'file')}, none with {word!r} in its path" if files else f"no {KINDS} there"
         )
         raise BadInput(
             " ".join(options.paths),
             "",
-            what,
+            problem,
             "nothing was tested; a test is a scenario or a case in such a file",
         )
     if desk.port and (given := options.given("seed", "sanitize")):
         raise BadInput("", given[0], "is not for a robot at a port", "leave it out")
     case = next((file for file in chosen if file.endswith(CASE_SUFFIX)), None)
     if desk.port and case is not None:
-        what = "a case is judged by what is inside the twin, which no port shows"
-        raise BadInput(case, "--port", what, "leave it out, or send it with `mirotwin replay`")
+        problem = "a case is judged by what is inside the twin, which no port shows"
+        raise BadInput(case, "--port", problem, "leave it out, or send it with `mirotwin replay`")
     if junit is not None:
         check_file(junit, "--junit", *chosen)
     if options.pages:
@@ -98,12 +98,12 @@ def test(options: TestOptions) -> int:
                 leave_page(Path(result.left))
             except (OSError, BadInput) as error:
                 (complain if options.as_json else show_line)(f"    no page: {error}")
-    reported = Results(command="test", cases=cases, verdict=judge(one.verdict for one in results))
+    reported = Results(command="test", cases=cases, verdict=judge(result.verdict for result in results))
     if options.as_json:
         reported.print_json()
     else:
         show_line(_summary(results))
-    complain(*(stale_line(options.sanitizer.allow, one) for one in allowed if one not in applied))
+    complain(*(stale_line(options.sanitizer.allow, entry) for entry in allowed if entry not in applied))
     reported.write_junit(junit)  # the verdicts are printed first, whatever becomes of their file
     if all(file.endswith(CASE_SUFFIX) for file in chosen):
         _refuse_unused(in_files(options.expected).values(), results)
@@ -114,8 +114,10 @@ def _refuse_unused(files: Iterable[str], results: Sequence[Result]) -> None:
     """Raises BadInput for a check in a file that none of the cases names."""
     used = {word for result in results for word in shlex.split(result.again)}
     for text in sorted(set(files) - used):
-        what = f"no case is judged by {text}"
-        raise BadInput("", "--expect", what, "leave it out, or name the one that the cases have in [expect]")
+        problem = f"no case is judged by {text}"
+        raise BadInput(
+            "", "--expect", problem, "leave it out, or name the one that the cases have in [expect]"
+        )
 
 
 def _show(result: Result, options: TestOptions) -> None:
@@ -142,10 +144,10 @@ def _show(result: Result, options: TestOptions) -> None:
 
 def _summary(results: Sequence[Result]) -> str:
     """What came of all."""
-    counted = Counter(one.verdict for one in results)
+    counted = Counter(result.verdict for result in results)
     reported = [verdict for verdict in VERDICTS if counted[verdict]]
     text = ", ".join(f"{counted[verdict]} {VERDICTS[verdict].counted}" for verdict in reported)
-    if unseen := sum(one.unseen for one in results):
+    if unseen := sum(result.unseen for result in results):
         text += f"; {amount(unseen, 'step or expectation is', 'steps and expectations are')} not observable on a port"
     return text
 

@@ -35,14 +35,14 @@ def run_sanitized(
     """
     with sanitized() as watching:
         result = run_file(options, file)
-        found, stale = judged(watching.take(), allowed, options.sanitizer.kinds)
+        findings, stale = judged(watching.take(), allowed, options.sanitizer.kinds)
     lines: list[Line] = []
-    for finding in found:
+    for finding in findings:
         verdict, text = line_of(finding)
         lines.append((verdict, text))
         if line := options.debug_line_for(file, finding):
             lines.append((verdict, f"    {line}"))
-    used = [one for one in allowed if one not in stale]
+    used = [entry for entry in allowed if entry not in stale]
     verdict = judge((result.verdict, *(verdict for verdict, _ in lines)))
     return replace(result, verdict=verdict, said=[*result.said, *lines]), used, [*watching.unseen]
 

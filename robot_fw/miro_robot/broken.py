@@ -10,9 +10,9 @@ from miro_robot.processor_board import ProcessorBoard
 LM629S = {"busy": STUCK, "dead": DEAD, "ok": WHOLE}
 
 
-def break_processor(board: ProcessorBoard, what: str) -> None:
+def break_processor(board: ProcessorBoard, fault: str) -> None:
     """Does the fault if any board can have it."""
-    word, *values = what.split()
+    word, *values = fault.split()
     if word == "flip":
         address, bit = values[0].split("h.")
         place = int(address, 16)
@@ -24,12 +24,12 @@ def break_processor(board: ProcessorBoard, what: str) -> None:
         board.dip()
 
 
-def break_board(board: Board, what: str) -> None:
+def break_board(board: Board, fault: str) -> None:
     """Does the fault if it is one of the board alone; any other one begins where its chips are now."""
     # Where the chips are depends on where the run was cut; up to the processor's own time it does not.
     board.sync(board.cpu.cycles * CYCLE_TICKS)
-    word, *values = what.split()
+    word, *values = fault.split()
     if word == "lm629":
         (board.left if values[0] == "left" else board.right).port.broken = LM629S[values[1]]
     else:
-        break_processor(board, what)
+        break_processor(board, fault)

@@ -108,9 +108,9 @@ class Reader:
     def findings(self, seen: Sanitizer) -> list[Finding]:
         """One for each cause: what happened goes before what may."""
         best: dict[tuple[str, ...], Finding] = {}
-        for finding in sorted(self._all(seen), key=lambda one: (not one.did, one.tick, one)):
+        for finding in sorted(self._all(seen), key=lambda finding: (not finding.did, finding.tick, finding)):
             best.setdefault(finding.cause, finding)
-        return sorted(best.values(), key=lambda one: (not one.did, one))
+        return sorted(best.values(), key=lambda finding: (not finding.did, finding))
 
     def _all(self, seen: Sanitizer) -> Iterator[Finding]:
         again = self._read_again(seen)
@@ -153,7 +153,9 @@ class Reader:
         """`each`: (tick, the other instruction, which one) of the times that differ; `deaf`: nothing reads SBUF."""
         (kind, says), (tick, other, which) = _NOTES[mistake], min(each)
         says = _DEAF.get(mistake, says) if deaf else says
-        changed = [name for number, name in enumerate(_REGISTERS) if number in {one for _, _, one in each}]
+        changed = [
+            name for number, name in enumerate(_REGISTERS) if number in {register for _, _, register in each}
+        ]
         words = says.format(
             which=", ".join(changed),
             source=INTERRUPTS[which % len(INTERRUPTS)],

@@ -78,9 +78,14 @@ def layout_of(image: Image) -> Layout:
     variables = variables_of(image)
     places, local_names = _shared(image)
     names, elements = {}, set()
-    kept = [one for each in variables.by_name.values() for one in each if one.space in ("iram", "xram")]
+    kept = [
+        variable
+        for each in variables.by_name.values()
+        for variable in each
+        if variable.space in ("iram", "xram")
+    ]
     for variable in sorted(
-        kept, key=lambda one: not one.local
+        kept, key=lambda variable: not variable.local
     ):  # where both claim a byte, the whole program's wins
         base = variable.address + (XRAM if variable.space == "xram" else 0)
         if variable.local:
@@ -119,12 +124,12 @@ def _of_keil(image: Image, keil: KeilMap, lines: dict[int, int]) -> Iterator[tup
         dptr = code[at + 1] << 8 | code[at + 2] if code[at] == _DPTR else dptr + (code[at] == _INC_DPTR)
         within.add(XRAM + dptr)
         at = next((at + more for more in range(1, length) if lines.get(at + more) != number), at + length)
-    words = [one for one in touched.values() if len(one) > 1]
+    words = [touched_bytes for touched_bytes in touched.values() if len(touched_bytes) > 1]
     for space, first, size, name in keil.variables:
         base, room = (first + XRAM, XRAM + 0x10000) if space == "xram" else (first, _IRAM_BYTES)
         bytes_of_it = {*range(base, base + size)}
         if base + size <= room and (
-            size == 1 or (size <= _LONGEST and any(bytes_of_it <= one for one in words))
+            size == 1 or (size <= _LONGEST and any(bytes_of_it <= touched_bytes for touched_bytes in words))
         ):
             yield base, size, name
 
@@ -132,19 +137,19 @@ def _of_keil(image: Image, keil: KeilMap, lines: dict[int, int]) -> Iterator[tup
 def _shared(image: Image) -> tuple[dict[int, tuple[int, int]], dict[tuple[int, str], str]]:
     """What the map alone says: the area of overlays, and parameters of library functions."""
     symbols = image.symbols.names
-    in_ram = sorted({one.address for one in symbols.values() if one.space == "iram"})
+    in_ram = sorted({symbol.address for symbol in symbols.values() if symbol.space == "iram"})
     records = _LOCAL_PLACE.findall(read_text(image.path.with_suffix(".cdb")))
     names = {(int(at, 16), function): name for function, name, at in records}
     places: dict[int, tuple[int, int]] = {}
     for first, end in map_overlays(read_text(image.path.with_suffix(".map"))):
         places.update((place, (LOCAL, place)) for place in range(first, min(end, _IRAM_BYTES)))
-    for name, one in symbols.items():
-        if _PARAMETER in name and one.space == "iram":
-            end = min([at for at in in_ram if at > one.address], default=_IRAM_BYTES)
-            size = min(end - one.address, _MOST_PARAMETER_BYTES)
+    for name, symbol in symbols.items():
+        if _PARAMETER in name and symbol.space == "iram":
+            end = min([at for at in in_ram if at > symbol.address], default=_IRAM_BYTES)
+            size = min(end - symbol.address, _MOST_PARAMETER_BYTES)
             function, _, number = name.removeprefix("_").partition(_PARAMETER)
-            known = names.get((one.address, function), f"parameter {number}")
-            for place in range(one.address, one.address + size):
+            known = names.get((symbol.address, function), f"parameter {number}")
+            for place in range(symbol.address, symbol.address + size):
                 places[place] = LOCAL, place
                 names[place, function] = known
     return places, names
