@@ -28,20 +28,20 @@ Which claims of the paper hold on this twin, and which of its two laws is better
 
 {opening}
 The paper: [Yang and Kim, 1999](https://doi.org/10.1109/70.768190). `mirotwin reproduce` makes this page: {runs} runs
-with firmware, LM629, motors, radio and camera, seeds {seeds}, 6 s each, with the same figures on every computer. It
-also writes [all tables]({tables}), and rows.csv with a row for each run.
+with firmware, LM629, motors, radio and camera, seeds {seeds}, 6 s each. It also writes [all tables]({tables}), and
+rows.csv with a row for each run.
 
-The paper does not give its gains, paths, speeds, origin, nor the cause of its 2.40 cm. Chosen here:
+The paper gives neither gains, paths, speeds, origin nor the cause of its 2.40 cm. Chosen here:
 
-* The paper's law has one set of gains for Figs. 6 and 7 and one for Fig. 8. A search found them; they were checked on
-  seeds 1000 to 1099 and then frozen. [The same searches for both laws](gains.md).
+* The paper's law has one set of gains for Figs. 6 and 7 and one for Fig. 8, found by [a search](gains.md), checked on
+  seeds 1000 to 1099, then frozen.
 * The camera has a calibration that is wrong by up to 2.40 cm (`1997`).
-* Epsilon-tracking, with which the paper compares, is reconstructed (`host/miro_host/laws/epsilon_tracking.py`). Of its
-  gains *theory* obeys its theory, *illustrative* looks like the paper's Fig. 9, *retuned* (the defaults) and *line*
-  (for the straight line) were found for this loop. They are no evidence about the original.
+* Epsilon-tracking is reconstructed (`host/miro_host/laws/epsilon_tracking.py`). Of its gains *theory* obeys its theory,
+  *illustrative* looks like the paper's Fig. 9, *retuned* (the defaults) and *line* (for the straight line) were found
+  for this loop. They are no evidence about the original.
 
 A run *settles* if it stays within 3 cm and 0.15 rad for its last second. Errors are root mean squares of that second:
-in *truth*, or as the *camera* sees it (measurement against reference), which is all that could be plotted in 1999.
+in *truth*, or as the *camera* sees it (measurement against reference), all that could be plotted in 1999.
 """
 
 
@@ -53,37 +53,37 @@ def page(stored: StoredTables, folder: str, tables: str) -> str:
 
 
 def _table(names: Sequence[str], rows: Iterable[Sequence[str]]) -> Iterator[str]:
-    for cells in (names, *rows):
-        yield "".join(f"| {cell} " if cell else "| " for cell in cells) + "|"
-        if cells is names:
-            yield "|---" * len(names) + "|"
-    yield ""
+    """Text in columns."""
+    lines = [[cell.replace("`", "") for cell in cells] for cells in (names, *rows)]
+    widths = [max(map(len, column)) for column in zip(*lines, strict=True)]
+    yield "```text"
+    for cells in lines:
+        yield "  ".join(cell.ljust(width) for cell, width in zip(cells, widths, strict=True)).rstrip()
+    yield "```\n"
 
 
 CLAIMS = """\
 ## What the paper claims, and what was measured
 
-A verdict is computed from a criterion, which is in the tables. Convergence, for example, means that 90 % of the runs
-settle and that their median error is within 2.40 cm.
+Each verdict follows from a criterion, which is in the tables. Convergence: 90 % of the runs settle, their median error
+is within 2.40 cm.
 """
 
 
 def _claims(stored: StoredTables) -> Iterator[str]:
     yield CLAIMS
-    rows = [
-        (figure, claim, deciding, f"**{verdict}**")
-        for figure, claim, _, _, deciding, verdict in stored.rows("claims")
-    ]
-    yield from _table(("figure", "claim", "what decides", "verdict"), rows)
+    for figure, claim, _, _, deciding, verdict in stored.rows("claims"):
+        yield f"* {figure}, **{verdict}**: {claim} ({deciding})"
+    yield ""
 
 
 BETTER = """\
 ## Which of the two laws is better
 
-Cells: the law that is better, if one is, and the median error in cm of the paper's law / of epsilon-tracking, over the
-seeds with which both settle. In brackets: how many runs of each settle, where that decides. The {count} comparisons
-hold together at {level:.0f} %: each is a sign test at {level:.0f} % / {count}. The gains of the paper's law are for the
-starts of Figs. 6 to 8, those of *line* for Figs. 6, 7 and 9.
+The law that is better, if one is; the median error in cm of the paper's law / of epsilon-tracking, over the seeds with
+which both settle; in brackets how many runs of each settle, where that decides. The {count} comparisons hold together
+at {level:.0f} %: each is a sign test at {level:.0f} % / {count}. The gains of the paper's law are for the starts of
+Figs. 6 to 8, those of *line* for Figs. 6, 7 and 9.
 """
 SIDES = {"truth": "in truth", "camera": "as the camera sees it"}
 OPPOSITE = "Under a biased camera the true error and the error that the camera sees rank the same two laws oppositely."
@@ -135,10 +135,10 @@ def _better(stored: StoredTables) -> Iterator[str]:
 
 
 def _cell(row: Row) -> str:
-    """**paper** 1.22/1.61, or **epsilon** (0/38)."""
+    """Such as "paper 1.22/1.61", or "epsilon (0/38)"."""
     medians, settle, _, verdict = row[4:]
     numbers = f"({settle.partition(' of ')[0]})" if settle else medians
-    winner = {OURS: f"**{OURS}** ", THEIRS: f"**{THEIRS}** ", NOT_JUDGED: f"{NOT_JUDGED}: "}.get(verdict, "")
+    winner = {OURS: f"{OURS} ", THEIRS: f"{THEIRS} ", NOT_JUDGED: f"{NOT_JUDGED}: "}.get(verdict, "")
     return winner + numbers.replace(" / ", "/")
 
 
@@ -148,7 +148,7 @@ FIGURE_COLUMNS = {"truth": 2, "not settled": 8}
 
 def _figures(stored: StoredTables, folder: str) -> Iterator[str]:
     yield "## The figures\n"
-    yield "Median error in truth in cm of all runs, and in brackets how many of them do not settle:\n"
+    yield "Median error in truth in cm of all runs; in brackets how many do not settle:\n"
     rows = stored.rows("figures")
     cells = {
         (
@@ -166,17 +166,17 @@ def _figures(stored: StoredTables, folder: str) -> Iterator[str]:
     yield from _table(("controller", *figures), lines)
     for figure, controller, lost, frames, seen, everywhere in stored.rows("lost"):
         yield (
-            f"*{controller}* in {figure} is a lost camera: in the median run the robot is not found in {lost} of"
-            f" {frames} frames.\nWith white noise in place of pictures its error is {everywhere} cm, not {seen} cm.\n"
+            f"*{controller}* in {figure} is a lost camera: the median run does not find the robot in {lost} of {frames}"
+            f" frames.\nWith white noise in place of pictures its error is {everywhere} cm, not {seen} cm.\n"
         )
-    yield "The pictures show, of each controller, the run with the median error.\n"
+    yield "Of each controller the run with the median error:\n"
     for start in STARTS:
         yield f"![Fig. {start.figure} again]({folder}/{start.name}.svg)\n"
 
 
 def _cameras(stored: StoredTables) -> Iterator[str]:
     yield "## What the camera decides\n"
-    yield f"Median error in truth in cm; that with `{camera_name('')}` is above.\n"
+    yield f"Median error in truth in cm (`{camera_name('')}`: above).\n"
     rows = [
         (camera, controller, *(cell.partition(" / ")[0] for cell in cells))
         for camera, controller, *cells in stored.rows("cameras")

@@ -203,12 +203,13 @@ def test_the_page_opens_with_the_errors_that_rank_the_laws_oppositely():
     }
     rows = table(**changes, fig9_paper={"settled": False})
     text = " ".join(page(rows).split())
+    lines = [re.split("  +", line) for line in page(rows).splitlines()]
     assert OPPOSITE in text
     assert "with `pixels, 1997` from 4 / 1 in truth and 0 / 5 as the camera sees it" in text
-    one, far = "**paper** 1.00/2.00", "**epsilon** (0/20)"
-    assert f"| retuned; pixels, 1997; truth | {one} | {one} | {one} | {far} | {one} |" in text
-    one = "**epsilon** 0.90/0.30"
-    assert f"| retuned; pixels, 1997; camera | {one} | {one} | {one} | {far} | {one} |" in text
+    one, far = "paper 1.00/2.00", "epsilon (0/20)"
+    assert ["retuned; pixels, 1997; truth", one, one, one, far, one] in lines
+    one = "epsilon 0.90/0.30"
+    assert ["retuned; pixels, 1997; camera", one, one, one, far, one] in lines
     assert OPPOSITE not in page(table())
     comparisons = tables_of(rows, "0 to 19").rows("comparisons")
     key = [RETUNED, "pixels, 1997", "truth"]
@@ -218,7 +219,7 @@ def test_the_page_opens_with_the_errors_that_rank_the_laws_oppositely():
 
 def test_too_few_seeds_give_medians_and_no_verdict():
     rows = {label: rows[:5] for label, rows in table(fig6_epsilon_retuned={"rms_position_cm": 9.0}).items()}
-    assert "| retuned; pixels, 1997; truth | not judged: (5/5) |" in page(rows, "0 to 4")
+    assert re.search(r"^retuned; pixels, 1997; truth +not judged: \(5/5\)", page(rows, "0 to 4"), re.M)
     first = tables_of(rows, "0 to 4").rows("comparisons")[0]
     assert first == [
         RETUNED,
@@ -430,8 +431,8 @@ def test_one_seed_gives_a_page_five_pictures_rows_and_recordings_the_same_bytes_
     assert not any(row["error"] for row in rows)
     page = (tmp_path / "a/reproduction.md").read_text()
     assert "seeds 4 to 4" in page
-    (ours,) = [line for line in page.splitlines() if line.startswith("| `body_frame`")]
-    assert len(re.findall(r"\d \([01]\) \|", ours)) == 5
+    (ours,) = [line for line in page.splitlines() if re.match(r"body_frame.*\(", line)]
+    assert len(re.findall(r"\d \([01]\)", ours)) == 5
     tables = read(tmp_path / "a/reproduction/tables.json")
     ours = [row for row in tables.rows("figures") if row[1].startswith("`body_frame`")]
     assert len(ours) == 5
