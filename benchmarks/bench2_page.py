@@ -87,16 +87,20 @@ def _leaders(rows: Rows) -> Iterator[str]:
     best = {law: next(one.entry for one in boards[-1] if one.entry.startswith(f"{law}, ")) for law in LAWS}
     order = sorted(best.values(), key=[one.entry for one in boards[-1]].index)
     heads = [head for of_class in CLASSES for head in (f"{of_class}: place", "settled", "errors, cm")]
-    yield f"| entry | {' | '.join(heads)} |"
-    yield f"|---{'|---' * len(heads)}|"
+    lines = [["entry", *heads]]
     for entry in order:
-        cells = []
+        cells = [entry]
         for board in boards:
             place, one = next((place, one) for place, one in enumerate(board, start=1) if one.entry == entry)
             errors = (one.errors[figure] for figure in FIGURES)
             text = "/".join("-" if error is None else f"{error.median:.2f}" for error in errors)
             cells += [f"{place}", f"{one.settled}", text]
-        yield f"| {entry} | {' | '.join(cells)} |"
+        lines.append(cells)
+    widths = [max(map(len, column)) for column in zip(*lines, strict=True)]
+    yield "```text"
+    for cells in lines:
+        yield "  ".join(cell.ljust(width) for cell, width in zip(cells, widths, strict=True)).rstrip()
+    yield "```"
 
 
 def _middle(value: Middle | None, sign: str = "") -> str:

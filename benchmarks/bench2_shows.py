@@ -15,13 +15,13 @@ SHOWS = """\
 * **The first places cannot be told apart**: no comparison by truth decides between the first {plain_alike} entries of
   the plain class, nor between the first {learning_alike} of the self-calibrated one.
 * **The filter makes most of it.** On the closed path the camera error of {names} is {plain_camera_none} cm without an
-  estimator and {plain_camera_ekf} cm with `ekf`. Their truth error stays where the wrong calibration puts it
+  estimator, {plain_camera_ekf} cm with `ekf`. Their truth error stays where the wrong calibration puts it
   ({plain_truth_none} and {plain_truth_ekf} cm). With self-calibration it is {learning_truth_none} and
   {learning_truth_ekf} cm.
 * **The law makes less of it.** With `ekf`, the others of these laws are better than `{reference}` in {law_better} of
   {law_count} comparisons by truth and worse in {law_worse}; {law_unknown} cannot be told after correction.
-* **Where wheels slip fewer runs settle with `ekf`**, for a reason that was not tested: of {slip_count} runs {slip_none}
-  without an estimator, {slip_predict} with `predict`, {slip_ekf} with `ekf`.
+* **Where wheels slip fewer runs settle with `ekf`** (why was not tested): of {slip_count} runs {slip_none} with none,
+  {slip_predict} with `predict`, {slip_ekf} with `ekf`.
 * **A wrong camera hides which entry is nearer.** Errors decide {plain_truth} of {pair_count} comparisons in truth and
   {plain_camera} by camera (plain), {learning_truth} and {learning_camera} self-calibrated; in opposite ways
   {plain_opposite} and {learning_opposite}.
