@@ -40,9 +40,10 @@ def render(hard: Rows, planted: Rows) -> str:
         missed = [row for row in hard if any(">" in row.get(title, "") for title in TITLES.values())]
         parts.append(f"Mistakes that need a rare input: {_said(hard)}. Those that some seed missed:\n")
         titles = [title for title in TITLES.values() if title in hard[0]]
-        lines = [["mistake", "needs", *titles], ["---"] * (2 + len(titles))]
-        lines += [[row[title] for title in ("mistake", "needs", *titles)] for row in missed if row["needs"]]
-        parts += ["| " + " | ".join(line) + " |" for line in lines]
+        for row in missed:
+            if row["needs"]:
+                said = ", ".join(f"{title} {row[title]}" for title in titles)
+                parts.append(f"* {row['mistake']} (needs {row['needs']}): {said}")
         parts.append("")
     if planted:
         mistakes = [row for row in planted if row["mistake"] != FOUND]

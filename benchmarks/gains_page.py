@@ -47,35 +47,35 @@ HEAD = """\
 
 {verdict}
 
-The paper prints no gains, and the shipped ones come from searches of different kinds. Here both laws get {repeats}
-searches under each of three cameras: that of the scenarios, whose calibration is wrong by up to 2.40 cm; the same with
-an exact calibration; and white noise of 2.40 cm. A search tries {explored} gain sets drawn from wide bounds, then
-{refined} near the best for the line (Figs. 6, 7, 9) and as many for the curve (Figs. 8, 10). The best of these {first}
-sets is kept, and the search goes on to {second}. The paper's law has {papers} gains, epsilon-tracking {others}, so its
-searches after {second} sets stand beside those of epsilon-tracking after {first}, too.
+The paper prints no gains. Here both laws get {repeats} searches under each of three cameras: that of the scenarios,
+whose calibration is wrong by up to 2.40 cm; the same with an exact calibration; and white noise of 2.40 cm. A search
+tries {explored} gain sets drawn from wide bounds, then {refined} near the best for the line (Figs. 6, 7, 9) and as many
+for the curve (Figs. 8, 10). The best of these {first} sets is kept, and the search goes on to {second}. The paper's law
+has {papers} gains, epsilon-tracking {others}, so its searches after {second} sets stand beside those of
+epsilon-tracking after {first}, too.
 
 * The seeds that choose ({search} and {check}) are not the seeds that measure ({held_out}).
 * A run *settles* if it stays within 3 cm and 0.15 rad for its last second. Errors are root mean squares of that
   second, of the runs that settle: a law that settles from fewer starts is judged by the easier ones.
 * All searches minimise the error *in truth*, which a laboratory cannot measure.
-* One set is for all starts of a path. The shipped gains of the paper's law, for Figs. 6 and 7 alone, have smaller
-  errors and settle from the start of Fig. 9 in no run.
+* The shipped gains of the paper's law, for Figs. 6 and 7 alone, have smaller errors and settle from the start of
+  Fig. 9 in no run.
 
-All tables, with the best gain sets, are in [gains.json](../benchmarks/gains.json). To run it again:
+[All tables, with the best gain sets](../benchmarks/gains.json). To run it again:
 
 <!-- not run: {thousands} 000 runs, half an hour on two cores; tests/sim/test_gains.py has its parts -->
 ```sh
 python -m benchmarks.gains --write docs/gains.md --journal gains.jsonl
 ```
 
-This gives the same bytes on every computer. A command that was stopped goes on with the journal.
+This gives the same bytes everywhere. A stopped command goes on with the journal.
 """
 VERDICT_HEAD = """\
 ## Which law is better
 
-How many of {count} comparisons under a camera (two paths, three budgets) the paper's law / epsilon-tracking wins. A
-law wins if its search is the better one in at least {decisive:.0f} of 100 pairs of searches. Equal laws reach that in
-4 % of the cases (Mann-Whitney): three or four of all {all} are chance.
+How many of {count} comparisons under a camera (two paths, three budgets) the paper's law / epsilon-tracking wins: its
+search is the better one in at least {decisive:.0f} of 100 pairs. Equal laws reach that in 4 % of the cases
+(Mann-Whitney): three or four of all {all} are chance.
 """
 MEDIANS_HEAD = """\
 The medians of {repeats} searches after {second} sets, the paper's law / epsilon-tracking (errors in cm, chattering in
@@ -88,7 +88,7 @@ ONE_SET_HEAD = """\
 ## One set for Figs. 6, 7 and 9
 
 Another search found a set with which epsilon-tracking drives all three (*line* in [the paper again](reproduction.md)).
-The paper's law with its shipped gains / epsilon-tracking with this set, medians of the runs that settle, seeds {seeds}:
+Shipped gains / this set, medians of the runs that settle, seeds {seeds}:
 """
 
 
@@ -130,10 +130,11 @@ def _filled(text: str) -> Iterator[str]:
         yield part if part[0] in "#<!*" else "\n".join(wrap(part, 120, break_on_hyphens=False))
 
 
-def table(*head: str) -> Iterator[str]:
-    """The first two lines of a table."""
-    yield f"| {' | '.join(head)} |"
-    yield "|---" * len(head) + "|"
+def columns(rows: Sequence[Sequence[str]]) -> Iterator[str]:
+    """A block of text with the cells of each row below each other."""
+    widths = [max(map(len, cells)) for cells in zip(*rows, strict=True)]
+    lines = ("  ".join(map(str.ljust, row, widths)).rstrip() for row in rows)
+    yield from ("```text", *lines, "```")
 
 
 FIRST = 3
@@ -171,32 +172,34 @@ def _by_camera(pairs: Sequence[Row]) -> str:
 
 
 def _verdict_lines(pairs: Sequence[Row]) -> Iterator[str]:
-    yield from table("camera", *(measure.name for measure in MEASURES))
+    rows = [["camera", *(measure.name for measure in MEASURES)]]
     for camera in dict.fromkeys(row[0] for row in pairs):
         won = [wins([row for row in pairs if row[0] == camera], measure) for measure in MEASURES]
-        yield f"| {camera} | {' | '.join(f'{one[PAPER.name]}/{one[RETUNED.name]}' for one in won)} |"
+        rows.append([camera, *(f"{count[PAPER.name]}/{count[RETUNED.name]}" for count in won)])
+    return columns(rows)
 
 
 def _median_lines(found: StoredTables) -> Iterator[str]:
     """Of each camera and path at the end: both laws' medians."""
     names = found.tables["spread"][0]
-    columns = [names.index(measure.name) for measure in MEASURES]
-    yield from table("camera", "path", *(names[column] for column in columns))
+    shown = [names.index(measure.name) for measure in MEASURES]
+    rows = [["camera", "path", *(names[column] for column in shown)]]
     end = [row for row in found.rows("spread") if row[names.index("sets")] == found.about["sets at the end"]]
     for camera, path in dict.fromkeys((row[0], row[2]) for row in end):
         both = [row for row in end if (row[0], row[2]) == (camera, path)]
-        cells = ["/".join(row[column].partition(" ")[0] for row in both) for column in columns]
-        settled = both[0][columns[0]].rpartition(" ")[2]
-        yield f"| {camera} | {path} | {cells[0]} of {settled} | {' | '.join(cells[1:])} |"
+        cells = ["/".join(row[column].partition(" ")[0] for row in both) for column in shown]
+        settled = both[0][shown[0]].rpartition(" ")[2]
+        rows.append([camera, path, f"{cells[0]} of {settled}", *cells[1:]])
+    return columns(rows)
 
 
 def _one_set_lines(found: StoredTables) -> Iterator[str]:
     rows = found.rows("one set, verdicts")
     measures = list(dict.fromkeys(row[1] for row in rows))
-    yield from table("camera", *measures)
     medians = {(row[0], row[1]): f"{row[2]}/{row[3]}" for row in rows}
-    for camera in dict.fromkeys(row[0] for row in rows):
-        yield f"| {camera} | {' | '.join(medians[camera, measure] for measure in measures)} |"
+    cameras = dict.fromkeys(row[0] for row in rows)
+    table = [[camera, *(medians[camera, measure] for measure in measures)] for camera in cameras]
+    return columns([["camera", *measures], *table])
 
 
 SIZE = (1000, 1110)

@@ -108,7 +108,7 @@ def test_planted_mistakes_stand_beside_each_other_by_engine():
 def test_the_page_shows_the_rare_mistakes_that_some_seed_missed_alone():
     missed = [trial("afl", 1, 3.0), trial("afl", 2, None)]
     needs = FOR_FUZZING[NAME].needs
-    assert f"| {NAME} | {needs} | 3.0* >60 |\n" in render(rows(hard_table(missed)), [])
+    assert f"* {NAME} (needs {needs}): AFL++ 3.0* >60\n" in render(rows(hard_table(missed)), [])
     assert NAME not in render(rows(hard_table(missed[:1])), [])
     assert render(rows(hard_table([])), rows(planted_table([]))) == ""
 

@@ -30,9 +30,9 @@ def stored(name):
 
 
 def rows_of(page):
-    """The cells of all table rows of a page."""
-    lines = [line for line in page.read_text(encoding="utf-8").splitlines() if line.startswith("| ")]
-    return [[cell.strip() for cell in line.strip("|").split(" | ")] for line in lines]
+    """The cells of all lines in the page's blocks of text."""
+    blocks = re.findall(r"```text\n(.*?)```", page.read_text(encoding="utf-8"), re.DOTALL)
+    return [re.split("  +", line) for block in blocks for line in block.splitlines()]
 
 
 def test_the_table_of_the_eye_has_each_case_and_the_page_has_rows_of_it():

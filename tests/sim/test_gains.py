@@ -289,10 +289,10 @@ def test_the_page_is_the_same_from_a_journal_and_has_no_place_of_this_machine(tm
 
 
 def rows_of(text, title):
-    """The cells of the tables of a section."""
+    """The cells of the blocks of a section."""
     section = text.partition(f"## {title}\n")[2].partition("\n## ")[0]
-    lines = [line for line in section.splitlines() if line.startswith("| ")]
-    return [[cell.strip() for cell in line.strip("|").split(" | ")] for line in lines]
+    blocks = re.findall(r"```text\n(.*?)```", section, re.DOTALL)
+    return [re.split("  +", line) for block in blocks for line in block.splitlines()]
 
 
 def all_rows_are_there(found, repeats):
