@@ -200,7 +200,7 @@ class Table(NamedTuple):
 
     def on_page(self, rows):
         """The rows as the page has them."""
-        return markdown([[row[column] for column in self.shown] for row in rows])
+        return in_columns([[row[column] for column in self.shown] for row in rows])
 
 
 TABLES = {
@@ -216,9 +216,12 @@ def marked(name):
     return re.compile(f"({begin}).*?(<!-- end of the table -->)", re.S)
 
 
-def markdown(rows):
-    lines = ["| " + " | ".join(cell.replace("|", "\\|") for cell in row) + " |" for row in rows]
-    return "\n".join([lines[0], "|---" * len(rows[0]) + "|", *lines[1:]]) + "\n"
+def in_columns(rows):
+    widths = [max(map(len, column)) for column in zip(*rows, strict=True)]
+    lines = [
+        "  ".join(cell.ljust(width) for cell, width in zip(row, widths, strict=True)).rstrip() for row in rows
+    ]
+    return "\n".join(["```text", *lines, "```"]) + "\n"
 
 
 def csv_text(rows):
