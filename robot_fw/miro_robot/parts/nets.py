@@ -336,7 +336,7 @@ class Nets:
         self._note_observed()
 
     def ignore(self, observer: Observer) -> None:
-        """The end of that."""
+        """Ends `observe`."""
         self.observers.remove(observer)
         self._note_observed()
 
@@ -347,8 +347,8 @@ class Nets:
             net, port, mask = self.ports[number], number >> 3, 1 << (number & 7)
             if net >= self.count:  # nobody else is on it, so it was not kept
                 self.live[port] = self.live[port] & ~mask | (mask if self.observed[net] else 0)
-                self.levels[net] = self._latched(number)
-                self.lows[net] = 1 - self.levels[net]
+                self.lows[net] = 1 - self._latched(number) + self.shorts[number]
+                self.levels[net] = self._level(net, 0, 0)
 
     def _report(self, tick: int, net: int, level: int) -> None:
         for observer in self.observers:
@@ -594,7 +594,7 @@ class Nets:
         self.touched_count = 0
 
     def _level(self, net: int, low: int, high: int) -> int:
-        """The level of a net without so many of its strong drivers."""
+        """The level of a net, leaving out `low` of the drivers to 0 and `high` of those to 1."""
         if self.lows[net] > low:
             return 0
         if self.highs[net] > high:
@@ -627,7 +627,7 @@ class Nets:
             self._mark_pin(place)
 
     def _mark_pin(self, place: int) -> None:
-        """A part is to be called for one of its pins; without supply only what moves, and goes on, is."""
+        """A part is to be called for one of its pins; without supply only a continuous part is."""
         index = self.pin_part[place]
         part = self.parts[index]
         if self.powered or part.continuous:
@@ -636,7 +636,7 @@ class Nets:
                 self._wait(index)
 
     def _wait(self, index: int) -> None:
-        """In their order, whichever net was the first: a part may look at another one."""
+        """Inserts by index: the order of calls must not depend on that of nets, as parts may read each other."""
         self.is_waiting[index] = 1
         end = self.waiting_count
         while end and self.waiting[end - 1] > index:

@@ -498,3 +498,21 @@ def test_outputs_that_meet_while_a_pin_that_nothing_is_wired_to_is_shorted_are_a
     board.hold_pin(1, 7, 0)
     board.sync(20)
     assert [fault.kind.name for fault in board.faults] == ["NET_CONTENTION"]
+
+
+@pytest.mark.parametrize("level", [0, 1])
+@pytest.mark.parametrize("latched", [0, 1])
+def test_a_short_of_a_pin_with_nothing_on_it_lasts_while_it_is_observed_and_ends(level, latched):
+    board = board_of()
+    board.port_written(P3, 0x7F | latched << 7, 12)
+    net = board.nets.number("P3.7")
+    board.hold_pin(3, 7, level)
+    observer = Observer([net])
+    board.nets.observe(observer)
+    assert board.nets.levels[net] == level
+    board.port_written(P3, 0x7F | (1 - latched) << 7, 24)
+    assert board.nets.levels[net] == level
+    board.hold_pin(3, 7, -1)
+    assert board.nets.levels[net] == 1 - latched
+    board.port_written(P3, 0x7F | latched << 7, 48)
+    assert board.nets.levels[net] == latched
