@@ -4,7 +4,7 @@
     {"run":0,"verdict":"passed",..}              one line an outcome, in the order in which they came
 
 Each line is handed to the operating system at once, so a process that is killed loses none that it has written; the
-last line may be cut off, and is left out. Once a second the file is written to the disk.
+last line may be cut off, and is left out. `fsync` follows at most once a second.
 """
 
 from __future__ import annotations
@@ -26,6 +26,7 @@ from mirotwin.shell.outputs import locked_elsewhere
 
 SYNC_S = 1.0
 _LINE_BYTES = 1 << 20
+_BEGIN = b'{"mirotwin_campaign":'
 
 
 def journal_path(results: Path) -> Path:
@@ -56,7 +57,7 @@ class Journal:
                 raise BadInput(path, "", "another process is writing to it", remedy)
             if discard:  # once it is locked: not from under another process
                 self._stream.truncate(0)
-            self._take_up()
+            self._resume()
         # Ctrl-C too: the lock lasts as long as the stream is open.
         except BaseException:
             self._stream.close()
@@ -73,15 +74,27 @@ class Journal:
         if self.done[outcome.run]:
             return
         # Counted only after this: a run whose line a full disk refused stays missing, and is done again.
-        self._stream.write(json_bytes(outcome) + b"\n")
+        self._append(json_bytes(outcome) + b"\n")
         self._count(outcome.run)
         # Not each time: waiting for the disk takes longer than many a run.
         if perf_counter() - self._synced_s >= SYNC_S:
             os.fsync(self._stream.fileno())
             self._synced_s = perf_counter()
 
+    def _append(self, line: bytes) -> None:
+        """Writes a whole line or nothing. Raises OSError."""
+        begin, written = self._stream.seek(0, os.SEEK_END), 0
+        try:
+            while written < len(
+                line
+            ):  # a disk that fills up takes the beginning of a line, and says so only next time
+                written += self._stream.write(line[written:])
+        except BaseException:
+            self._stream.truncate(begin)  # else the next line would be glued to the cut one
+            raise
+
     def missing(self) -> Iterator[int]:
-        """Runs without an outcome, from the first one on; what is added meanwhile is not missing."""
+        """Runs without an outcome, ascending; runs added while iterating are skipped."""
         run = self.done.find(0)
         while run >= 0:
             yield run
@@ -91,16 +104,16 @@ class Journal:
         self.done[run] = 1
         self.count += 1
 
-    def _take_up(self) -> None:
+    def _resume(self) -> None:
         """Reads what an earlier process has left, and cuts off a line that it could not finish."""
         head, whole = read_head(self.path)
-        # Outcomes of another plan count for runs that this one does not have: seed or settings may differ.
+        # Outcomes of another plan belong to other runs: seed or settings differ.
         difference = "" if head is None else self.head.difference(head)
         if head is None or (
             difference and next(outcomes(self.path), None) is None
         ):  # there is nothing to lose
             self._stream.truncate(0)
-            self._stream.write(json_bytes(self.head) + b"\n")
+            self._append(json_bytes(self.head) + b"\n")
             return
         if difference:
             reason = f"holds the unfinished results of another campaign: {difference}"
@@ -126,8 +139,8 @@ def read_head(path: Path) -> tuple[Head | None, int]:
         # Limited: a file of somebody else may be gigabytes without a line end.
         line = stream.readline(_LINE_BYTES)
     if not line.endswith(b"\n") and len(line) < _LINE_BYTES:
-        # A part of our begin is a head that was cut. Anything else is somebody's file, and would be emptied.
-        if line and not b'{"mirotwin_campaign":'.startswith(line[:21]):
+        # The beginning of our own first line: its writer was killed. Anything else is somebody's file, and is kept.
+        if line and not _BEGIN.startswith(line[: len(_BEGIN)]):
             raise _no_journal(path)
         return None, 0
     try:
@@ -137,7 +150,7 @@ def read_head(path: Path) -> tuple[Head | None, int]:
 
 
 def _no_journal(path: Path) -> BadInput:
-    return BadInput(path, "", "is no campaign's file", "choose another file with --out, or take it away")
+    return BadInput(path, "", "is not a campaign's journal", "choose another file with --out, or move it")
 
 
 def outcomes(path: Path) -> Iterator[tuple[RunOutcome, int]]:
@@ -169,9 +182,9 @@ def in_order(outcomes: Iterable[RunOutcome]) -> Iterator[RunOutcome]:
         # Earlier ones were given out already: a second outcome of a run would be a row too many.
         if outcome.run >= turn:
             early.setdefault(outcome.run, outcome)
-        while turn in early:  # one outcome may be all that a row of early ones has waited for
+        while turn in early:  # one outcome may release several that were held
             yield early.pop(turn)
             turn += 1
-    # Some run never came: what waited for it is given out all the same.
+    # A run has no outcome: those held for it follow.
     for run in sorted(early):
         yield early[run]

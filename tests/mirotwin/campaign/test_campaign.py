@@ -1,5 +1,6 @@
 """A campaign from its file to its results: the same rows whoever runs them, and none is lost."""
 
+import errno
 from concurrent.futures import ThreadPoolExecutor
 
 import pytest
@@ -13,6 +14,7 @@ from mirotwin import campaign
 from mirotwin.campaign import running
 from mirotwin.campaign.journal import Journal, journal_path
 from mirotwin.campaign.results import wall_path
+from mirotwin.campaign.worker import RunOutcome
 from mirotwin.campaign.workers import Processes
 from mirotwin.recording.track import Tracks, settled
 from mirotwin.runs.summary import summarise, tracking_of
@@ -164,6 +166,38 @@ def test_unfinished_results_without_a_single_outcome_are_in_nobodys_way(tmp_path
     assert campaign.run(plan_of(), path, InThisProcess()).new == 6
 
 
+class FillingDisk:
+    """A stream whose disk takes so many more bytes, the last of them of a cut write."""
+
+    def __init__(self, stream, room):
+        self.stream, self.room = stream, room
+
+    def write(self, data):
+        if not self.room:
+            raise OSError(errno.ENOSPC, "No space left on device")
+        data = data[: self.room]
+        self.room -= len(data)
+        return self.stream.write(data)
+
+    def __getattr__(self, name):
+        return getattr(self.stream, name)
+
+
+def test_a_line_that_a_full_disk_cut_is_taken_back_and_its_run_is_missing(tmp_path):
+    path = journal_path(tmp_path / "short.parquet")
+    with Journal(path, plan_of().head) as journal:
+        stream = journal._stream
+        journal.add(RunOutcome(run=0, verdict="passed"))
+        journal._stream = FillingDisk(stream, 5)
+        with pytest.raises(OSError, match="No space left"):
+            journal.add(RunOutcome(run=1, verdict="passed"))
+        journal._stream = FillingDisk(stream, 10_000)
+        journal.add(RunOutcome(run=2, verdict="passed"))
+        assert next(journal.missing()) == 1
+    with Journal(path, plan_of().head) as journal:
+        assert [run for run in range(3) if not journal.done[run]] == [1]
+
+
 @pytest.mark.parametrize("content", [b"", b"PAR1", b"text", b"x" * 4000])
 def test_a_file_that_is_no_campaigns_results_is_refused(tmp_path, content):
     path = tmp_path / "short.parquet"
@@ -177,7 +211,7 @@ def test_a_file_that_is_no_campaigns_results_is_refused(tmp_path, content):
 def test_a_file_that_is_no_campaigns_part_is_refused(tmp_path, content):
     path = tmp_path / "short.parquet"
     journal_path(path).write_bytes(content)
-    with pytest.raises(BadInput, match="is no campaign's file"):
+    with pytest.raises(BadInput, match="is not a campaign's journal"):
         campaign.run(plan_of(), path, InThisProcess())
     assert journal_path(path).read_bytes() == content
 
