@@ -71,16 +71,16 @@ def load(path: str | Path, settings: Sequence[str] = (), plugins: PluginFiles | 
     if not path.exists() and str(path) in builtin_names():
         own = BUILTIN / f"{path}.toml"
         plan = _parsed(own.read_text(encoding="utf-8"), own)
-        return _checked(msgspec.structs.replace(plan, path=str(path)), settings, plugins)
+        return _with_plugins(msgspec.structs.replace(plan, path=str(path)), settings, plugins)
     try:
         text = decode(read_input(path, TEXT_KIB << 10), str(path))
     except FileNotFoundError:
         remedy = f"`mirotwin examples campaign` writes one; built-in: {', '.join(builtin_names())}"
         raise BadInput(path, "", "there is no such file", remedy) from None
-    return _checked(_parsed(text, path), settings, plugins)
+    return _with_plugins(_parsed(text, path), settings, plugins)
 
 
-def _checked(plan: Plan, settings: Sequence[str], plugins: PluginFiles | None) -> Plan:
+def _with_plugins(plan: Plan, settings: Sequence[str], plugins: PluginFiles | None) -> Plan:
     """Raises BadInput."""
     if plugins is None:
         return checked(plan, settings)
