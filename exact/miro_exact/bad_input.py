@@ -1,4 +1,4 @@
-"""The error of input that cannot be used, one line `FILE: PLACE: what; remedy`, and words for such lines."""
+"""The error of unusable input, one line `FILE: PLACE: what; remedy`, and helpers for its text."""
 
 from collections.abc import Iterable, Iterator
 from contextlib import contextmanager
@@ -6,15 +6,15 @@ from os import PathLike
 from typing import Any
 
 LONGEST_END = 300
-"""Characters of each end of a long part that are shown."""
+"""Characters shown of each end of a long text."""
 
 
 class BadInput(ValueError):
-    """Input that cannot be used.
+    """Unusable input. `path`: the file or another source.
 
-    `path`: the file, or what else the input came from. `place`: where in it. A line number and a (line, column), from
-    1, follow the path as in a compiler's message; a text (a key, an option, `offset 8`) stands for itself; 0 and "" are
-    the whole file. `what` is wrong, and `remedy` is what to do about it. Each may be "".
+    `place`: in the file; a line number or (line, column), from 1, follows the path as in a compiler's message; a text
+    (a key, an option, `offset 8`) is shown unchanged; 0 and "" are the whole file. `what`: the error, and `remedy`: its
+    fix. Each may be "".
     """
 
     def __init__(
@@ -35,14 +35,17 @@ class BadInput(ValueError):
         super().__init__(one_line(f"{text}; {shortened(remedy)}" if remedy else text))
 
     def __reduce__(self) -> tuple[Any, ...]:
-        """What a process hands to another: a base class, because a derived one may be made of other parts."""
+        """Pickles as the base class for other processes, because a derived class may have other constructor
+        arguments.
+        """
         return BadInput, (self.path, self.place, self.what, self.remedy)
 
     @classmethod
     @contextmanager
     def at(cls, path: str | PathLike[str], place: str = "") -> Iterator[None]:
-        """Within it, input that cannot be used came from `path`, where its place is below `place`: what is wrong with a
-        text need not know where that stood. The error becomes one of this class.
+        """Adds `path` and `place` to BadInput raised in the block, because a parser of a text does not know its file.
+
+        The error becomes one of this class.
         """
         try:
             yield
@@ -53,7 +56,7 @@ class BadInput(ValueError):
 
 
 def did_you_mean(word: str, known: Iterable[str], remedy: str = "") -> str:
-    """The remedy for a word that is not among the known ones: the nearest of them, if one is near, and `remedy`."""
+    """The remedy for an unknown word: the most similar known word, if there is one, and `remedy`."""
     from difflib import get_close_matches  # only an error needs it
 
     spelt = {name.lower(): name for name in known}
@@ -62,7 +65,7 @@ def did_you_mean(word: str, known: Iterable[str], remedy: str = "") -> str:
 
 
 def one_line(text: str) -> str:
-    """The text with everything that a terminal would not print as it stands escaped."""
+    """The text with all characters escaped that a terminal would not print unchanged."""
     return "".join(char if char.isprintable() else repr(char)[1:-1] for char in text)
 
 

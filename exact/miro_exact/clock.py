@@ -25,16 +25,16 @@ PWM_PERIOD_TICKS = 2048
 """LM629 PWM period: 512 of its clocks (11.72 kHz)."""
 
 HOST_BIT_TICKS = 2500
-"""One UART bit of the PC at 9600 baud."""
+"""One UART bit of the PC at 9600 baud, in ticks."""
 
 ROBOT_BIT_TICKS = 2496
-"""One UART bit of the robot: Timer 2 reload 65536 - 78 (9615.38 baud, +0.16 %)."""
+"""One UART bit of the robot in ticks: Timer 2 reload 65536 - 78 (9615.38 baud, +0.16 %)."""
 
 CHARACTER_BITS = 10
 """8N1: start bit, eight data bits, stop bit."""
 
 HOST_CHARACTER_TICKS = CHARACTER_BITS * HOST_BIT_TICKS
-"""One character of the PC: 1.0417 ms."""
+"""One character of the PC: 1.0417 ms, in ticks."""
 
 CAMERA_FRAME_TICKS = 800_800
 """NTSC frame, 30000/1001 Hz (33.37 ms)."""
@@ -49,9 +49,9 @@ NEVER_TICK = 1 << 62
 def ticks(seconds: float | Fraction, crystal_hz: int = TICKS_PER_SECOND) -> int:
     """Seconds to ticks, rounded half up.
 
-    A float stands for the decimal number that it prints as (`repr`, the shortest one that reads back as the
-    same float), so `0.001` is one millisecond exactly and not the binary fraction beside it; the product and
-    the rounding are exact. Raises ValueError for NaN and infinities.
+    A float means its printed decimal number (`repr`, the shortest one that reads back as the same float), so `0.001` is
+    one millisecond exactly and not the binary fraction beside it; the product and the rounding are exact. Raises
+    ValueError for NaN and infinities.
     """
     return (2 * exact(seconds) * crystal_hz + 1) // 2
 
@@ -68,7 +68,7 @@ def us(time: float | Fraction) -> int:
 
 @lru_cache(typed=True)  # a float and a fraction of equal value are two numbers here
 def exact(time: float | Fraction) -> Fraction:
-    """The decimal number that a float prints as, everything else as it is."""
+    """A float as the decimal number that it prints as; any other number unchanged."""
     return Fraction(repr(time)) if isinstance(time, float) else Fraction(time)
 
 

@@ -2,7 +2,7 @@
 
 
 class DomainError(ValueError, OverflowError):
-    """A number is not finite, or beyond what a function takes: with checked parameters far from any robot's."""
+    """A number is not finite, or outside the range of a function. Checked parameters are far from this on any robot."""
 
 
 MAX_SEED = (1 << 63) - 1

@@ -1,11 +1,11 @@
-"""Which twin of a hot module runs: the compiled one, or the source it was compiled from.
+"""Selects the engine: a hot module runs compiled, or as the source it was compiled from.
 
-A hot module is an `x.py` with an `x.pxd` beside it (`hot_modules`). Both twins give the same bits; this file decides
-which of them an import gets, keeps the two from being mixed, and refuses a compiled module whose source has changed. An
-`x.pyx` has no twin: the compiled engine alone uses it.
+A hot module is an `x.py` with an `x.pxd` beside it (`hot_modules`). Both forms give the same bits. This file decides
+which form an import gets, prevents mixing, and refuses a compiled module whose source has changed. An `x.pyx` has no
+Python form: only the compiled engine uses it.
 
-Every process that imports a package of ours loads this file, `mirotwin --help` too: it imports little, and looks at a
-module when it is imported instead of listing all of them before.
+Every process that imports one of our packages loads this file, even `mirotwin --help`, so it imports little, and
+examines a module only when that is imported.
 """
 
 from __future__ import annotations
@@ -48,9 +48,10 @@ _ZERO = bytes(8)  # a comparison may take a subnormal for zero, which is another
 
 
 def check_arithmetic() -> None:
-    """Raises EngineError where sums and products of doubles have other bits than elsewhere, and says by what.
+    """Raises EngineError, with the difference, if sums and products of doubles have other bits here than elsewhere.
 
-    For the calling thread as it is now: a library may change its rounding, or flush to zero, when it is loaded.
+    It checks the present state of the calling thread: a library may change rounding, or flush to zero, when it is
+    loaded.
     """
     mode = (
         "up" if _ONE + _UNSEEN != _ONE
@@ -120,7 +121,7 @@ class EngineFinder:
 
     @cached_property
     def sources(self) -> dict[str, Path]:
-        """Dotted name -> source file of every hot module that is installed, and of what they share."""
+        """Dotted name -> source file of every installed hot module, and of the files they share."""
         from miro_exact.hot_modules import SHARED
 
         package, _, name = SHARED.partition(".")
@@ -180,8 +181,8 @@ def install() -> EngineFinder:
 def select(engine: str) -> None:
     """Chooses the engine of this process. Must come before the first hot module is imported.
 
-    Raises EngineError when another engine is already in use, or when `compiled` is asked for and a hot module
-    has no compiled twin.
+    Raises EngineError if another engine is already in use, or if `compiled` is requested and a hot module is not
+    compiled.
     """
     if engine not in ENGINES:
         raise EngineError(f"unknown engine {engine!r}", f"choose one of {', '.join(ENGINES)}")
@@ -196,7 +197,7 @@ def select(engine: str) -> None:
 
 
 def active() -> str:
-    """`compiled` or `python`: what hot modules run as (deciding it now if nothing has yet)."""
+    """The engine of hot modules, `compiled` or `python`; it is decided now if it was not before."""
     finder = install()
     if finder.engine is None:
         finder.engine = "python" if finder.missing() else "compiled"

@@ -1,7 +1,7 @@
-"""The kinds of fields that a table of state may name, and their flat bytes.
+"""The kinds of fields in tables of state, and their flat bytes.
 
-All bytes are little-endian, without padding, as Python's `struct` writes them with `<`. What comes from bytes is
-checked here: a value out of its range, a length beyond the room, NaN and an early end are a ValueError.
+All bytes are little-endian, without padding, as Python's `struct` writes them with `<`. Bytes are checked when read: a
+value out of its range, a length beyond the capacity, NaN and an early end raise ValueError.
 """
 
 from __future__ import annotations
@@ -28,13 +28,13 @@ _ROOM = 1 << 16
 
 
 NUMBER, ITEMS, OCTETS, ROW, ROWS, MEMORY, BLOCK = range(7)
-"""How `memory.Attributes` packs a field; the last two are those of a `Memory`, and of what packs itself."""
+"""How `memory.Attributes` packs a field; the last two are for a `Memory`, and for fields that pack themselves."""
 
 
 class Kind:
-    """What every kind of field can do. `form` says in a few letters how its bytes are to be read.
+    """The interface of all kinds of fields. `form`: a code of a few letters for the layout of its bytes.
 
-    `packed`: shape, codes, number of items and `split` for `memory.Attributes`, None where that cannot pack it.
+    `packed`: shape, codes, number of items and `split` for `memory.Attributes`, None if that cannot pack it.
     """
 
     form = ""
@@ -61,7 +61,7 @@ def _take(layout: struct.Struct, data: bytes, offset: int) -> tuple[Any, ...]:
 
 
 def out_of_range(value: Any, low: Any, high: Any) -> str:
-    """What is wrong with a value that is not from `low` to `high`."""
+    """The message about a value that is not from `low` to `high`."""
     # NaN alone is not equal to itself.
     return "is NaN" if value != value else f"is {value}, not from {low} to {high}"
 
@@ -167,9 +167,9 @@ class Items(Kind):
 
 
 class Queue(Items):
-    """The first items of an array with room for `room` of them; the field `end` says how many. Bytes as of `Items`.
+    """The used items of an array with capacity `room`; the field `end` contains their number.
 
-    Queues with the same `end` are of one length.
+    Bytes as of `Items`. Queues with the same `end` have one length.
     """
 
     def __init__(self, code: str, room: int, end: str, low: Any = None, high: Any = None) -> None:

@@ -1,7 +1,7 @@
-"""Hot modules: which there are, the compiled file of one, and the hash that ties both together.
+"""Finds hot modules, their compiled files, and the hash that ties source and compiled file together.
 
-A hot module is an `x.py`, or an `x.pyx`, with an `x.pxd` beside it. What does not belong here: which twin an import
-gets (`engine`). `setup.py` loads this file by its path, before anything is installed: it imports nothing of ours.
+A hot module is an `x.py`, or an `x.pyx`, with an `x.pxd` beside it. The choice between source and compiled file is made
+in `engine`. `setup.py` loads this file by its path, before anything is installed, so it imports none of our packages.
 """
 
 from __future__ import annotations
@@ -13,7 +13,7 @@ from importlib.machinery import EXTENSION_SUFFIXES
 from pathlib import Path
 
 DISPATCH_MARK = b"mirotwin: dispatch replicated"
-"""Bytes that the build leaves in a compiled module whose interpreter loop it could reshape (`threaded` in setup.py)."""
+"""Bytes that the build puts into a compiled module whose interpreter loop it has reshaped (`threaded` in setup.py)."""
 SHARED = "miro_exact.cython_shared"
 """A compiled module without source of ours: Cython's own code that all the others import."""
 _CIMPORT = re.compile(r"^from (\S+) cimport ([^#\n]+)", re.MULTILINE)
@@ -39,7 +39,7 @@ def source_hashes(package_dirs: dict[str, Path], sources: dict[str, Path]) -> di
     """Dotted name -> SHA-256 over the module's source, its `.pxd` and every `.pxd` that this one builds upon.
 
     These files fix the C layout that a compiled module relies on. `places.py` counts too: it adds to each of them.
-    `sources`: what `hot_sources` found in these folders, which takes as long as all of this.
+    `sources`: the result of `hot_sources` for these folders, which takes as long as this function.
     """
     texts = {name: _text(source.with_suffix(".pxd")) for name, source in sources.items()}
     import hashlib  # slow to load
@@ -57,7 +57,7 @@ def source_hashes(package_dirs: dict[str, Path], sources: dict[str, Path]) -> di
 
 
 def _cimported(text: bytes, texts: dict[str, bytes]) -> list[str]:
-    """The hot modules, of those in `texts`, that this `.pxd` builds upon by itself."""
+    """The hot modules in `texts` that this `.pxd` cimports directly."""
     used: list[str] = []
     for package, names in _CIMPORT.findall(text.decode()):
         modules = [package, *(f"{package}.{part.strip()}" for part in names.split(","))]
@@ -66,7 +66,7 @@ def _cimported(text: bytes, texts: dict[str, bytes]) -> list[str]:
 
 
 def _layout(name: str, cimported: dict[str, list[str]]) -> set[str]:
-    """The hot modules whose `.pxd` is part of this one's, itself among them."""
+    """The hot modules whose `.pxd` is part of this one's layout, including itself."""
     layout: set[str] = set()
     waiting = [name]
     while waiting:
@@ -83,7 +83,7 @@ def _text(path: Path) -> bytes:
 
 
 def compiled_file(source: Path) -> Path | None:
-    """The extension module that stands for this source, if one was built."""
+    """The extension module built from this source; None if there is none."""
     for suffix in EXTENSION_SUFFIXES:
         candidate = source.with_name(source.stem + suffix)
         if candidate.exists():
@@ -92,5 +92,5 @@ def compiled_file(source: Path) -> Path | None:
 
 
 def dispatch_replicated(modules: Iterable[Path]) -> bool:
-    """True if one of these compiled modules has an interpreter loop with the dispatch at the end of each arm."""
+    """True if one of these compiled modules has an interpreter loop with replicated dispatch."""
     return any(DISPATCH_MARK in module.read_bytes() for module in modules)

@@ -1,6 +1,6 @@
 """Reads an input file whole; refuses devices, pipes that may never end, and files larger than any valid one.
 
-Every file that a stranger may have made is read through here. `replace_file` writes one, whole or not at all.
+Every file from an untrusted source is read through this module. `replace_file` writes one, completely or not at all.
 """
 
 import codecs
@@ -13,7 +13,7 @@ from pathlib import Path
 from miro_exact.bad_input import BadInput, one_line, shortened
 
 TEXT_BYTES = 64 << 20
-"""For what is written by hand or by a tool chain: scenarios, symbol files, listings, streams, serial input."""
+"""Size limit of files written by hand or by tools: scenarios, symbol files, listings, streams, serial input."""
 IMAGE_BYTES = 4 << 20
 """Intel HEX: 64 KB of code with one byte a record is 1 MB."""
 BOARD_BYTES = EYE_BYTES = 1 << 20
@@ -25,18 +25,18 @@ RECORDING_NEEDS = 7
 """Memory that reading a whole large recording takes, in sizes of the file; more for a small one (docs/measured.md)."""
 CHUNK_BYTES = 1 << 20
 _OF_PROCESSES = ("/dev/", "/proc/self/fd/")
-"""Where a shell puts the pipe of `<(command)`."""
+"""Folders in which a shell puts the pipe of `<(command)`."""
 
 
 class InputError(BadInput):
-    """A file that is not read: `path`, what, remedy."""
+    """A file that is not read: `path`, reason, remedy."""
 
     def __init__(self, path: str, reason: str, remedy: str) -> None:
         super().__init__(path, "", reason, remedy)
 
 
 def check_no_folder(path: str | os.PathLike[str], likely: str = "") -> None:
-    """Refuses a folder; if it has a file called `likely`, that is what was probably meant."""
+    """Refuses a folder; names the file `likely` in it, if that exists, as the probable intention."""
     if os.path.isdir(path):
         meant = os.path.join(path, likely)
         hint = f", such as {meant}" if os.path.isfile(meant) else ""
@@ -44,16 +44,16 @@ def check_no_folder(path: str | os.PathLike[str], likely: str = "") -> None:
 
 
 def check_regular(path: str | os.PathLike[str]) -> None:
-    """Refuses what is there and is no regular file: what is read twice cannot come through a pipe."""
+    """Refuses an existing path that is no regular file: a file read twice cannot be a pipe."""
     check_no_folder(path)
     if os.path.exists(path) and not os.path.isfile(path):
         raise InputError(str(path), "is not a regular file", "copy the content to a file first")
 
 
 def path_beside(file: str | os.PathLike[str], name: str) -> str:
-    """The path of what `file` names: it has to lie, links resolved, in the folder of that file or below.
+    """The path of a file named inside `file`. With links resolved it must be in the folder of `file` or below.
 
-    Raises InputError: whoever wrote the file does not choose what else of this machine is read.
+    Raises InputError, so that the author of a file cannot select other files of this machine.
     """
     folder = os.path.dirname(file)
     path = os.path.join(folder, name)
@@ -73,8 +73,8 @@ def read_input(
 ) -> bytes:
     """The content of a file or pipe of at most `limit` bytes, or `prefix_limit` if it begins with `prefix`.
 
-    Raises InputError for folders, devices (but the null device, which is empty), pipes with a name of their own and
-    longer ones, OSError as `open` does.
+    Raises InputError for folders, devices (but the null device, which is empty), named pipes and longer files, OSError
+    as `open` does.
     """
     check_no_folder(path)
     check_ends(path)
@@ -106,7 +106,7 @@ _NON_ASCII = re.compile(rb"[\x80-\xff]+")
 
 
 def decode(data: bytes) -> str:
-    """A text file of whatever program, whose encoding `encoding_of` names."""
+    """Decodes a text file of any program, with the encoding from `encoding_of`."""
     encoding, mark = encoding_of(data)
     return data[mark:].decode(encoding, "replace")
 
@@ -114,8 +114,8 @@ def decode(data: bytes) -> str:
 def encoding_of(data: bytes, whole: bool = True) -> tuple[str, int]:
     """UTF-16 or UTF-8 by its mark, else UTF-8, CP936 (Chinese Windows), or CP1252; and the length of the mark.
 
-    What is not UTF-8 is CP936 if its bytes above 7Fh come in pairs: letters of CP1252 mostly stand alone. If `data` is
-    not the `whole` file, its last character may be cut.
+    Other text is CP936 if its bytes above 7Fh come in pairs: letters of CP1252 are mostly single. If `data` is not the
+    `whole` file, its last character may be cut.
     """
     for mark, encoding in _MARKS:
         if data.startswith(mark):
@@ -129,7 +129,7 @@ def encoding_of(data: bytes, whole: bool = True) -> tuple[str, int]:
 
 
 def check_ends(path: str | os.PathLike[str]) -> None:
-    """Refuses what reading may never come to the end of, before it is opened: opening a pipe waits for its writer."""
+    """Refuses an input that may never end before it is opened, because opening a pipe waits for its writer."""
     try:
         mode = os.stat(path).st_mode
     except OSError:
@@ -141,7 +141,7 @@ def check_ends(path: str | os.PathLike[str]) -> None:
 
 
 def check_memory(path: str | os.PathLike[str], size: int) -> None:
-    """Refuses a recording that would take more memory than there is: the system would end this program, or others."""
+    """Refuses a recording that needs more memory than available: the system would kill this program, or others."""
     available = available_bytes()
     if available is not None and size * RECORDING_NEEDS > available:
         needed = _in_mb(size * RECORDING_NEEDS)
@@ -150,7 +150,9 @@ def check_memory(path: str | os.PathLike[str], size: int) -> None:
 
 
 def available_bytes() -> int | None:
-    """Memory that this process may take yet: by the system, its control group and its limits; None if none says."""
+    """Memory that this process may still allocate, in bytes: by the system, its control group and its limits; None if
+    unknown.
+    """
     amounts = []
     with suppress(OSError, KeyError, ValueError):
         lines = Path("/proc/meminfo").read_text(encoding="ascii").splitlines()

@@ -1,8 +1,8 @@
-"""What other distributions register with us by entry points, and the sources that it is made of.
+"""Plug-ins that other distributions register by entry points, and the hashes of their sources.
 
-A run depends on the sources of its plug-ins, which a version does not tell: a distribution may be installed editable.
-They are the modules and packages of the distribution, with compiled modules and data inside; not what it imports from
-other distributions.
+A run depends on the sources of its plug-ins. A version does not identify them, because a distribution may be installed
+editable. The sources are the modules and packages of the distribution, with compiled modules and data inside, without
+imports from other distributions.
 """
 
 from __future__ import annotations
@@ -26,7 +26,7 @@ PREFIX = "mirotwin."
 DIGITS = 12
 """Of a hash of sources."""
 in_files: dict[tuple[str, str], str] = {}
-"""Kind and name of a plug-in that the command line brought in a file, and what it was made of."""
+"""(kind, name) of a plug-in brought by the command line in a file -> description of its sources."""
 
 
 def entries_of(group: str, name: str | None = None) -> list[EntryPoint]:
@@ -52,7 +52,10 @@ def _registered(group: str, paths: tuple[tuple[str, int], ...]) -> tuple[EntryPo
 
 
 def _may_register(path: str) -> bool:
-    """True if a distribution there may have entry points for us; so it may in what is no folder, as a zip file is."""
+    """True if a distribution at this path may have entry points for us.
+
+    A path that is no folder, such as a zip file, may.
+    """
     try:
         with os.scandir(path or ".") as children:
             folders = [
@@ -79,14 +82,14 @@ def owner(entry: EntryPoint) -> str:
 
 
 def place(entry: EntryPoint) -> str:
-    """Name and version of the distribution, and what it registers."""
+    """Name and version of the distribution, and the registered object."""
     return f"{owner(entry)} ({entry.value})"
 
 
 def described(kind: str, name: str) -> str:
-    """A plug-in (`kind`: law, estimator, reference, check, part) with version and hash of its sources, as they are now.
+    """A plug-in (`kind`: law, estimator, reference, check, part) with version and hash of its present sources.
 
-    `law samson: samson-law 1.0, sources 0123456789ab`; "" for what no distribution registers: our own.
+    `law samson: samson-law 1.0, sources 0123456789ab`; "" for our own, which no distribution registers.
     """
     if (kind, name) in in_files:
         return f"{kind} {name}: {in_files[kind, name]}"
@@ -156,7 +159,7 @@ def _files_of_module(module: str) -> dict[str, Path]:
 
 
 def _files(name: str, path: Path) -> dict[str, Path]:
-    """The file, or all in the folder but for what Python and editors leave there."""
+    """The file, or all files in the folder without those of Python and editors."""
     if path.is_file():
         return {name: path}
     listed = {}
@@ -169,7 +172,7 @@ def _files(name: str, path: Path) -> dict[str, Path]:
 
 
 def _top_level(dist: Distribution) -> set[str]:
-    """The modules and packages that a distribution brings, so far as it says."""
+    """The modules and packages of a distribution, if it lists them."""
     if stated := dist.read_text("top_level.txt"):
         return set(stated.split())
     paths = [path for path in dist.files or () if ".." not in path.parts]
@@ -177,7 +180,7 @@ def _top_level(dist: Distribution) -> set[str]:
 
 
 def _editable_folders(dist: Distribution) -> Iterator[Path]:
-    """Where the modules of a distribution are that was installed editable, and does not say which they are."""
+    """Source folders of an editable distribution that does not list its modules."""
     if dist.read_text("top_level.txt"):
         return
     for path in dist.files or ():
@@ -188,7 +191,7 @@ def _editable_folders(dist: Distribution) -> Iterator[Path]:
 
 
 def _module(name: str, package: bool) -> str:
-    """The module that a file or a package is; "" for what is neither."""
+    """The module name of a file or package; "" for neither."""
     stem = name.partition(".")[0]
     is_module = name == stem if package else name.endswith((".py", *EXTENSION_SUFFIXES))
     return stem if is_module and stem.isidentifier() and not stem.startswith("__") else ""

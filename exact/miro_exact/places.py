@@ -1,12 +1,13 @@
-"""What the build does to each hot module: it adds where fields lie, and takes out what sets arrays to zero.
+"""Changes the build makes to each hot module: it adds the addresses of fields, and removes zero initialisation of
+arrays.
 
-Loaded from its file by setup.py, before anything is installed, so it imports nothing of ours.
+Loaded from its file by setup.py, before anything is installed, so it imports none of our packages.
 
 For every `cdef class` there is a function `_places_CLASS(part)`. It gives name -> (address, C type, size in bytes) of
 all fields that are plain C data. Fields that are Python objects are not in it; fields of base classes are in theirs.
 
-A new object of a compiled class is all zero bits. So `self.NAME = [0] * N` in its `__init__` says what is so, and takes
-its time: N numbers are taken out of a list. Uncompiled it makes the list.
+A new object of a compiled class is all zero bits. So `self.NAME = [0] * N` in its `__init__` changes nothing, but costs
+time for N list items. In Python it makes the list.
 """
 
 from __future__ import annotations
@@ -57,7 +58,7 @@ def fields_of(layout: str) -> dict[str, list[tuple[str, str, bool]]]:
 
 
 def text(layout: str) -> str:
-    """What is appended to the source of the module that this `.pxd` belongs to."""
+    """The text appended to the source of the module of this `.pxd`."""
     functions = []
     for name, fields in fields_of(layout).items():
         lines = "".join(
@@ -69,7 +70,7 @@ def text(layout: str) -> str:
 
 
 def without_zeros(source: str, layout: str) -> str:
-    """The source of a module without what sets C arrays of new objects to zero. Lines keep their numbers."""
+    """The source of a module without the zero initialisation of C arrays in new objects. Line numbers stay the same."""
     fields = fields_of(layout)
     lines = source.splitlines(keepends=True)
     for made in (node for node in ast.parse(source).body if isinstance(node, ast.ClassDef)):

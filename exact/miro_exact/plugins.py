@@ -1,4 +1,4 @@
-"""Plug-ins that a scenario names: the table of our own, and those that other distributions add by entry points.
+"""Plug-ins named in a scenario: our own, and those added by other distributions' entry points.
 
 A plug-in is chosen by a frozen `msgspec` struct of its parameters whose tag is the plug-in's name. A distribution adds
 one in its `pyproject.toml`:
@@ -6,8 +6,8 @@ one in its `pyproject.toml`:
     [project.entry-points."mirotwin.laws"]
     samson = "samson_law:Parameters"
 
-Two of one name are an error that names both, also where one is our own: a run must not depend on which is found first.
-The command line may bring one in a file, `FILE.py:CLASS`. Files that strangers hand over hold names only.
+Two plug-ins of one name are an error that names both, also if one is our own: a run must not depend on the search
+order. The command line may bring one in a file, `FILE.py:CLASS`. Files from untrusted sources contain names only.
 """
 
 import importlib.util
@@ -37,10 +37,10 @@ class PluginError(BadInput):
 class Registry(msgspec.Struct, Generic[Plugin], frozen=True, eq=False):
     """Plug-ins of one kind.
 
-    `word` is what a message calls a plug-in, and with an s the group of the entry points; `key` the scenario key that
-    names it, `base` the struct that all structs of parameters derive from (`module:class`), `own` our table: name to
-    `module:class`. `default` is the plug-in of a table that does not say its name, if there is one. `in_files`: those
-    that the command line brought, by name.
+    `word`: the kind in messages; with an s, the entry points' group. `key`: the scenario key that names the plug-in.
+    `base`: the struct from which all parameter structs derive (`module:class`). `own`: our table, name ->
+    `module:class`. `default`: the plug-in of a table without a name, if there is one. `in_files`: brought by the
+    command line, by name.
     """
 
     word: str
@@ -116,9 +116,9 @@ class Registry(msgspec.Struct, Generic[Plugin], frozen=True, eq=False):
 
 
 def installed_part(group: str, word: str, name: str, own: str = "") -> Any:
-    """The entry point that has this name, None where there is none. Raises PluginError where two plug-ins have it.
+    """The entry point of this name, None if there is none. Raises PluginError if two plug-ins have it.
 
-    `own`: what has the name in our own table, if something has.
+    `own`: our own plug-in of this name, if there is one.
     """
     entries = installed.entries_of(group, name)
     places = ([f"mirotwin ({own})"] if own else []) + [installed.place(entry) for entry in entries]
@@ -151,7 +151,7 @@ def module_of(path: str, option: str) -> ModuleType:
 
 
 def use_one_of(choices: Iterable[str]) -> str:
-    """The remedy for what is not one of them."""
+    """The remedy for a value that is not among `choices`."""
     *others, last = choices
     return f"use {', '.join(others)} or {last}" if others else f"use {last}"
 

@@ -1,7 +1,7 @@
-"""Where a plug-in went wrong: file, line and function, for the line that tells the error.
+"""Locates an error of a plug-in: file, line and function, for the error message.
 
-Our own code calls the plug-in and may be called by it, so neither end of a traceback is what its author looks for. That
-is the innermost line in the file in which the plug-in's code begins.
+Our own code calls the plug-in and may be called by it, so neither end of a traceback helps the plug-in's author. The
+useful line is the innermost one in the plug-in's first file.
 """
 
 from __future__ import annotations
@@ -24,17 +24,17 @@ def described(error: BaseException) -> str:
 
 
 def raised(error: BaseException) -> str:
-    """Type, message and place of what a plug-in raised, in one line."""
+    """Type, message and place of a plug-in's exception, in one line."""
     return at_place(described(error), raised_at(error) or _raised_by_ours(error))
 
 
 def at_place(text: str, place: str) -> str:
-    """`text` with the place, if that is known."""
+    """`text` with the place, if it is known."""
     return f"{text} ({place})" if place else text
 
 
 def raised_at(error: BaseException) -> str:
-    """`FILE:LINE in FUNCTION` of the plug-in's code that raised it; "" where none of that was running."""
+    """`FILE:LINE in FUNCTION` of the plug-in's code that raised it; "" if no such code was running."""
     if isinstance(error, SyntaxError) and error.filename:
         return f"{_shown(error.filename)}:{error.lineno}"
     steps = _steps(error)
@@ -44,21 +44,21 @@ def raised_at(error: BaseException) -> str:
 
 
 def _raised_by_ours(error: BaseException) -> str:
-    """Where our own code raised it, below who caught it: in a plug-in of this tree."""
+    """The line in our own code that raised it, for a plug-in of this tree."""
     below = _steps(error)[1:]
     ours = bool(below) and _is_ours(below[-1][0].f_globals.get("__name__"))
     return _place(below[-1][0].f_code, below[-1][1]) if ours else ""
 
 
 def _steps(error: BaseException) -> list[tuple[FrameType, int]]:
-    """Frames and lines from who caught it to who raised it."""
+    """Frames and lines of a traceback, from the catcher to the raiser."""
     from traceback import walk_tb  # only an error needs it
 
     return list(walk_tb(error.__traceback__))
 
 
 def defined_at(function: Any) -> str:
-    """`FILE:LINE in FUNCTION` of a plug-in's function or method; "" for ours, and for what is not Python."""
+    """`FILE:LINE in FUNCTION` of a plug-in's function or method; "" for ours, and for one that is not Python."""
     function = getattr(function, "__func__", function)
     code = getattr(function, "__code__", None)
     if not isinstance(code, CodeType) or _is_ours(getattr(function, "__module__", "")):

@@ -1,8 +1,8 @@
 """Random numbers as pure functions: Philox 4x32-10, named streams, and a Gaussian by table inversion.
 
-A draw depends on (master seed, stream name, kind of draw, index) and on nothing else. So drawing one stream
-never shifts another, a switched-off noise source leaves the others alone, any part of a run can be
-evaluated by itself, and there is no generator state to save.
+A draw depends only on (master seed, stream name, kind of draw, index). So drawing one stream never shifts another, a
+switched-off noise source does not change the others, any part of a run can be evaluated separately, and there is no
+generator state to save.
 
 Layout of a Philox block (Salmon, Moraes, Dror, Shaw, "Parallel random numbers: as easy as 1, 2, 3", SC 2011):
 
@@ -90,8 +90,8 @@ class Stream:
     def blocks(self, first: int, count: int, words: list[int]) -> None:
         """Writes up to 112 blocks of kind 0 into `words`, from block number `first` on.
 
-        Their first words stand from 0 on, their second words from 112 on, and so on. Four blocks at a time are worked
-        out: up to three more than `count` are written.
+        Their first words are at index 0 and up, their second words at 112 and up, and so on. Four blocks are computed
+        at a time, so up to three more than `count` are written.
         """
         four = [0] * 16
         for at in range(0, count, 4):
@@ -103,9 +103,9 @@ class Stream:
                 words[at + lane + 336] = four[lane + 12]
 
     def _four_blocks(self, first: int, four: list[int]) -> None:
-        """Four blocks of kind 0 from block number `first` on, as `philox4x32` gives them, in vectors.
+        """Four blocks of kind 0 from block number `first` on, equal to those of `philox4x32`, computed in vectors.
 
-        Their first words stand from 0 on, their second words from 4 on, and so on.
+        Their first words are at index 0 and up, their second words at 4 and up, and so on.
         """
         m0, m1, mask = 0xD2511F53, 0xCD9E8D57, 0xFFFFFFFF  # in locals, compilers know that these are 32 bits
         for lane in range(4):

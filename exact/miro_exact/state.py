@@ -12,21 +12,21 @@ A class declares what is its state once, in a table of names:
         "pending": Rows(64, "q", "B", "B"),           # a list of tuples
     }
 
-Everything else comes from the tables: saving, restoring, hashing, the names of what differs, and the check that nothing
-was forgotten (what is not state stands in `NOT_STATE`; tests/project/test_state_tables.py). What is saved but does not
-enter a digest stands in `NOT_HASHED`. Tables of base classes come first. The order of fields is that of the tables,
-depth first; bytes are those of `fields.py`.
+Saving, restoring, hashing, names of differing fields, and the check for missing fields all use the tables. Fields that
+are no state are listed in `NOT_STATE` (tests/project/test_state_tables.py). Fields that are saved but do not enter a
+digest are listed in `NOT_HASHED`. Tables of base classes come first. The order of fields is that of the tables, depth
+first; bytes are those of `fields.py`.
 
-Two methods of a part are called if it has them. `before_save` brings up to date what runs late; it changes nothing that
-the part will do. `after_load` works out again what follows from the fields (caches, edges seen), and raises ValueError
-where fields that are each in their range contradict each other.
+Two methods of a part are called if it has them. `before_save` updates values that are computed lazily; it does not
+change the part's behaviour. `after_load` recomputes derived values (caches, edges seen), and raises ValueError if
+fields contradict each other although each is in its range.
 
 `load` takes any bytes: it first checks all lengths and ranges and writes nothing, then writes and calls `after_load`.
-Where a check fails, the state stays as it was, and a ValueError names the field. The very same bytes object, loaded
-again, is not checked again: bytes do not change. Parts are looked up once, when a `Flat` is made: a part must not be
-replaced afterwards. What a class has is looked up once in a process.
+If a check fails, the state stays unchanged, and a ValueError names the field. The same bytes object is not checked
+again when it is loaded again, because bytes are immutable.
 
-In the compiled engine the build adds to each compiled module where the fields of its classes lie (`_places_NAME`), and
+Parts are looked up once, when a `Flat` is made: a part must not be replaced afterwards. Each class is examined once per
+process. For the compiled engine the build adds the addresses of fields to each module (`_places_NAME`), and
 neighbouring fields are copied by `memory.pyx`. Both engines give the same bytes.
 """
 
@@ -84,7 +84,7 @@ def table(cls: type) -> dict[str, Any]:
 
 @cache
 def kind_of(declared: Any) -> Kind:
-    """What a table says of a field that is no part."""
+    """The kind of a field in a table; not for parts."""
     if isinstance(declared, str):
         return Number(declared)
     if isinstance(declared, tuple):
@@ -113,7 +113,7 @@ class Below(NamedTuple):
 
 
 class Piece(NamedTuple):
-    """A group in one part. `prefix` stands before the names of its fields; `counts` as of a group."""
+    """A group of fields in one part. `prefix`: put before their names; `counts`: as of a group."""
 
     part: Any
     prefix: str
@@ -181,20 +181,20 @@ class Flat:
         return [field for piece in self._pieces for field in piece.fields()]
 
     def save(self) -> bytes:
-        """The state as it is. Raises DomainError with the field's name for NaN."""
+        """The present state. Raises DomainError with the field's name for NaN."""
         # All before the first byte is packed: settling one part may move fields of another.
         for settle in self._before:
             settle()
         return b"".join([block.pack() for block in self._packed])
 
     def hashed(self) -> bytes:
-        """The part of the state that a digest is made of: all but what tables name in `NOT_HASHED`."""
+        """The bytes for a digest: the state without the fields listed in `NOT_HASHED`."""
         for settle in self._before:
             settle()
         return b"".join([block.pack() for block in self._hashed])
 
     def load(self, data: bytes) -> None:
-        """Puts back what `save` gave. Raises ValueError, and changes nothing, for anything else."""
+        """Restores a state from `save`. Raises ValueError for any other bytes, and changes nothing then."""
         if data is not self._accepted:
             self._first_load(data)
         else:
@@ -297,7 +297,7 @@ def _own_entries(cls: type, part: Any) -> Iterator[Group | Below]:
 
 
 def _sort(name: str, declared: Any, places: dict[str, Any]) -> str:
-    """What a field is packed with."""
+    """The packer of a field."""
     if isinstance(declared, type | list):
         return "below"
     return "compiled" if name in places and isinstance(kind_of(declared), (Number, Queue)) else "alone"
@@ -312,7 +312,7 @@ def _places(cls: type, part: Any) -> dict[str, tuple[int, str, int]]:
 
 
 def _layout(part: Any, fields: list[tuple[str, Kind]], places: dict[str, tuple[int, str, int]]) -> Any:
-    """What `memory.pyx` has to know of a group. Raises TypeError if table and C layout do not agree."""
+    """The layout of a group for `memory.pyx`. Raises TypeError if table and C layout do not agree."""
     from miro_exact.memory import Layout
 
     rows: list[tuple[object, ...]] = []
@@ -366,7 +366,7 @@ def _together(blocks: list[Any]) -> list[Any]:
 
 
 def _attributes(block: Any) -> tuple[Any, ...]:
-    """What `memory.Attributes` has to know of a block."""
+    """The layout of a block for `memory.Attributes`."""
     if not isinstance(block, One):
         return block, "", MEMORY, b"", 0, None
     packed = block.kind.packed

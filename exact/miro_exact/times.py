@@ -22,7 +22,7 @@ TICK = re.compile(r"[0-9]{1,20}")
 
 
 class Time(msgspec.Struct, frozen=True):
-    """Seconds, or ticks of the crystal; which crystal is known only when all options are."""
+    """Seconds, or ticks of a crystal whose frequency is known only after all options are read."""
 
     text: str
     value: Fraction
@@ -40,7 +40,7 @@ class Time(msgspec.Struct, frozen=True):
 
 
 def time_of(text: str) -> Time | None:
-    """The time that a text says; None for any other text, a number without a unit included."""
+    """The time in a text; None for any other text, including a number without a unit."""
     match = SHAPE.fullmatch(text)
     if match is None:
         return None
@@ -51,7 +51,7 @@ def time_of(text: str) -> Time | None:
 
 
 def tick_of(text: str, crystal_hz: int) -> int | None:
-    """The tick that a number alone, or a time, says in a file; None for any other text."""
+    """The tick in a file's text, given as a number or a time; None for any other text."""
     if TICK.fullmatch(text):
         return int(text)
     time = time_of(text)

@@ -3,8 +3,8 @@
 The integrator's state is also the robot's velocity as the law sees it: differences of noisy postures are
 useless (0.8 cm of noise is 0.34 m/s after one frame).
 
-Integration error is the paper's first disturbance (section V-A). A law that is asked once a period leaves no exact
-integral to compare with; what there is are two rules of different order, with a_k the law's answer in period k:
+Integration error is the paper's first disturbance (section V-A). A law evaluated once a period has no exact integral to
+compare with; there are two rules of different order, with a_k the law's output in period k:
 
     euler            z_(k+1) = z_k + T a_k                       first order; takes a_k to hold for the period
     adams_bashforth  z_(k+1) = z_k + T (3 a_k - a_(k-1)) / 2     second order; takes a to go on as it changed last

@@ -29,7 +29,7 @@ PERIOD_S = 1001.0 / 30000.0  # one NTSC frame, 800 800 ticks
 
 
 class WheelCommand(msgspec.Struct, frozen=True, gc=False):
-    """What goes to the wheels, and how it came about: z_cmd in m/s and rad/s, the values that law and estimator name.
+    """The command to the wheels, with z_cmd in m/s and rad/s, and the values named by law and estimator.
 
     `left`, `right` in 1/256 count per LM629 sample, for wheels whose radii are the nominal one times `left_factor` and
     `right_factor`.
@@ -57,12 +57,11 @@ STANDSTILL = WheelCommand(0, 0, 0.0, 0.0)
 class Pilot:
     """Steers one robot along one reference, within the limits among the law's parameters.
 
-    `reference_lead_s` shifts the instant at which the reference is evaluated against the `t_s` handed to
-    `update`; 0 is the paper's loop. The shift is ours, not the paper's: a positive value (up to the time
-    the command takes effect) or a negative one (back to the exposure of the image in hand) compensates a
-    known delay without touching the law. `dead_s`, from a period's begin to the end of its frame, is told the
-    estimator. `numbers` is `command` as it is saved: wheels, wheel factors, velocities, and the named values in the
-    order of both `INNER`.
+    `reference_lead_s` shifts the instant at which the reference is evaluated against the `t_s` handed to `update`; 0 is
+    the paper's loop. The shift is ours, not the paper's: a positive value (up to the time the command takes effect) or
+    a negative one (back to the exposure of the image in hand) compensates a known delay without touching the law.
+    `dead_s`, from a period's begin to the end of its frame, is passed to the estimator. `numbers` is `command` as it is
+    saved: wheels, wheel factors, velocities, and the named values in the order of both `INNER`.
     """
 
     STATE = {
@@ -108,9 +107,11 @@ class Pilot:
     def update(
         self, measured: Posture | None, t_s: float, telemetry: LastTelemetry | None = None
     ) -> WheelCommand:
-        """One control period at `t_s` after the reference's start; `measured` and `telemetry` may be missing (None).
+        """Runs one control period at `t_s` after the reference's start; `measured` and `telemetry` may be missing
+        (None).
 
-        Raises PluginError, and leaves integrator and command alone, when the law fails or answers what is no number.
+        Raises PluginError, and leaves integrator and command unchanged, if the law fails or returns a value that is no
+        number.
         """
         z, units = self.integrator, self.units_per_m_s
         v_m_s, w_rad_s = z.v_m_s, z.w_rad_s
@@ -146,7 +147,7 @@ class Pilot:
         return self._asked
 
     def _answered(self, word: str, plugin: Law[Any] | Estimator[Any], given: Any) -> Any:
-        """What a plug-in answers, checked: what it says and what it remembers are finite and as it declares."""
+        """The output of a plug-in after checks: output and memory are finite and as declared."""
         try:
             answer = plugin.step(given)
             if plugin is self.law:
@@ -177,7 +178,7 @@ class Pilot:
 
 
 def _failure(word: str, plugin: Law[Any] | Estimator[Any], error: BaseException) -> PluginError:
-    """What to raise for what a plug-in raised: its name and the reason in one line."""
+    """The PluginError for a plug-in's exception: its name and the reason in one line."""
     known = type(error) in (ValueError, DomainError)
     reason = str(error) if known else described(error)
     place = raised_at(error) or defined_at(plugin.step)
@@ -221,7 +222,7 @@ def _check_factors(left: float, right: float) -> None:
 
 
 def _in_order(values: Mapping[str, float], declared: tuple[str, ...]) -> Mapping[str, float]:
-    """A copy, for a plug-in may go on to use its own."""
+    """A copy in declared order: the plug-in may continue to modify its own mapping."""
     return {name: values[name] for name in declared}
 
 

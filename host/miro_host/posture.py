@@ -1,4 +1,4 @@
-"""Where a robot stands: the posture q = (x, y, theta) of equation (8), the type that all modules share."""
+"""The posture q = (x, y, theta) of equation (8), the type that all modules share."""
 
 import msgspec
 

@@ -1,4 +1,4 @@
-"""What the PC knows from the robots' answers: the last one of each, with the encoder positions unwrapped.
+"""The robots' answers at the PC: the last one of each, with the encoder positions unwrapped.
 
 A frame carries the low 16 bits of each encoder count. The full count is taken as the one nearest to the count before; a
 robot boots at 0. This is right as long as a wheel turns by less than 32768 counts between two answers that arrive: for

@@ -1,4 +1,4 @@
-"""What the camera says about a posture: true posture in, noisy, gridded and late posture out.
+"""The camera's measurement of a posture: true posture in, noisy, gridded and late posture out.
 
 The heading is not put on a grid. Patch centroids are averages over some 64 pixels; if they were whole
 pixels, two of them 4 cm (9 pixels) apart would give headings in steps of more than 6 degrees, more than the

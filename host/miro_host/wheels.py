@@ -32,7 +32,7 @@ def nearest(x: float) -> int:
 
 
 class Wheels(msgspec.Struct, frozen=True):
-    """What the host believes about the drive: track, nominal wheel radius, speed limit; and the length of its words.
+    """The host's parameters of the drive: track, nominal wheel radius, speed limit; and the length of its words.
 
     Words of fewer than 16 bits have the same full scale and coarser steps: multiples of 2^(16 - word_bits) units.
     """

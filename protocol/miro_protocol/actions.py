@@ -1,4 +1,4 @@
-"""What is done to robots, radios, pins and parts at a tick; a script has transmissions and these."""
+"""Actions on robots, radios, pins and parts at a tick; a script consists of transmissions and these."""
 
 from __future__ import annotations
 
@@ -160,9 +160,9 @@ def _written(value: PutValue) -> str:
 
 
 Action = Reset | Power | RadioState | Put | Reseed | Fault
-"""What somebody does to a robot, a radio, a part or the noise in a world."""
+"""An action on a robot, a radio, a part or the noise in a world."""
 ScriptItem = Transmission | Action
-"""What goes into a world from outside."""
+"""The external input of a world."""
 
 
 def put_on_pin(item: ScriptItem | PinLevel) -> ScriptItem:

@@ -34,7 +34,7 @@ def register(data: bytes) -> int:
 
 @cache
 def table_of(bits: int) -> tuple[int, ...]:
-    """Words t for so many bits at once, 4 or 8: `register = register >> 8 ^ t[(register ^ byte) & 255]`.
+    """Words t for 4 or 8 bits at once: `register = register >> 8 ^ t[(register ^ byte) & 255]`.
 
     Of the nibbles of a byte the low one comes first: `register = register >> 4 ^ t[(register ^ nibble) & 15]`.
     """

@@ -96,7 +96,7 @@ class Scanner:
         return f"<decoder {self.format.name}: {counts}>"
 
     def begin(self) -> None:
-        """As new: nothing was heard yet."""
+        """Resets the decoder: nothing was received yet."""
         self.valid = 0
         self.rejected = 0
         self._clear()
@@ -104,7 +104,7 @@ class Scanner:
         self._paused = True
 
     def _clear(self) -> None:
-        """No character waits for its event."""
+        """Drops the characters that wait for their event."""
         self._count = 0
         self._last_bad = -1  # where the last bad stop bit is among them, and the last pause
         self._last_apart = -1
@@ -267,7 +267,7 @@ class Scanner:
             self.body[place] = self._data[sync + 2 + place] ^ self._white[place]
 
     def _lead_start(self, sync: int) -> int:
-        """Where the preamble begins: its last characters that are intact right before the sync."""
+        """Begin of the preamble: its last intact characters right before the sync."""
         start = sync
         expected = len(self._lead) - 1
         while start > 0 and expected >= 0:
@@ -294,21 +294,21 @@ class Scanner:
 
 
 class Decoder(Scanner):
-    """What a robot hears, in a network of `n` robots (3 or 5)."""
+    """Decodes the characters that a robot receives, in a network of `n` robots (3 or 5)."""
 
     def __init__(self, n: int) -> None:
         super().__init__(downlink(n))
 
 
 class TelemetryDecoder(Scanner):
-    """What the host hears from its robots."""
+    """Decodes the characters that the host receives from its robots."""
 
     def __init__(self) -> None:
         super().__init__(TELEMETRY)
 
 
 def checked_tick(tick: int, length: int) -> int:
-    """`tick`, if that and `length` ticks later can be told in 64 bits; else ValueError."""
+    """`tick`, if it and `length` ticks later fit in 64 bits; else raises ValueError."""
     if not -TICK_LIMIT <= tick <= TICK_LIMIT - length:
         raise ValueError(f"tick = {tick}: must be {-TICK_LIMIT}..{TICK_LIMIT}, the last character included")
     return tick

@@ -1,4 +1,4 @@
-"""What a decoder gives out: valid frames and damaged runs, with every character in exactly one of them."""
+"""The output of a decoder: valid frames and damaged runs, with every character in exactly one of them."""
 
 from __future__ import annotations
 
@@ -41,7 +41,7 @@ class Received(msgspec.Struct, frozen=True, gc=False):
         return self.body[0] % SEQ_MODULUS
 
     def message(self, n: int) -> Message:
-        """What the frame says, in a network of `n` robots; ContentError if that is nothing known."""
+        """The content of the frame, in a network of `n` robots. Raises ContentError for unknown content."""
         return _message(self.body, n)
 
 

@@ -225,7 +225,9 @@ def decode_fields(body: bytes, n: int) -> Message:
 
 
 def asking_step(seq: int, slot: int, n: int) -> int:
-    """How many numbers after `seq` is the next with which a frame of type 3 asks the robot in `slot` of `n`."""
+    """Steps from `seq` to the next number with which a frame of type 3 requests an answer of the robot in `slot` of
+    `n`.
+    """
     return next(step for step in range(1, SEQ_MODULUS) if (seq + step) % SEQ_MODULUS % n == slot)
 
 

@@ -47,7 +47,7 @@ def robot_counts() -> st.SearchStrategy[int]:
 
 
 def numbers(field: Field) -> st.SearchStrategy[int]:
-    """What may be sent in `field`."""
+    """Valid values of `field`."""
     return st.integers(field.low, field.high)
 
 
@@ -76,13 +76,13 @@ def telemetry_frames(n: int) -> st.SearchStrategy[TelemetryFrame]:
 
 
 def host_frames(n: int) -> st.SearchStrategy[Message]:
-    """What a host sends."""
+    """Messages that a host may send."""
     return st.one_of(team_frames(n), service_frames(n))
 
 
 @dataclass(frozen=True)
 class ReceivedStream:
-    """What a receiver hears: characters with stop bit and time, and the messages that were sent undamaged."""
+    """Received characters with stop bit and time, and the messages that were sent undamaged."""
 
     n: int
     symbols: tuple[Symbol, ...]
@@ -127,9 +127,8 @@ def _damaged(draw: st.DrawFn, wire: bytes) -> _Piece:
 
 
 def uart(bits: Sequence[int]) -> list[Symbol]:
-    """What a UART hears on a line that is mark, carries these bits of a host from tick 0 on, and is mark again.
-
-    Each bit is taken in its middle; the next fall is looked for from the end of the stop bit on.
+    """The characters that a UART receives on a line that is mark, carries these bits of a host from tick 0 on, and is
+    mark again. Each bit is sampled in its middle; the next falling edge is searched from the end of the stop bit on.
     """
     line, place = [1, *bits, *[1] * 10], 1
     symbols: list[Symbol] = []

@@ -75,7 +75,7 @@ def iterate(
 def iterate_pcap(
     data: bytes | Callable[[int], bytes], source: str = "<capture>", passed_over: Counter[str] | None = None
 ) -> Iterator[Transmission]:
-    """As `iterate`, of a capture in the old pcap format, with times in micro- or nanoseconds."""
+    """Like `iterate`, for a capture in the old pcap format, with times in micro- or nanoseconds."""
     return _only_serial(_PcapReader, data, source, passed_over)
 
 
@@ -316,7 +316,7 @@ def _is_serial(link_type: int) -> bool:
 
 
 def _foreign(head: bytes) -> tuple[str, str]:
-    """What a file that begins so is, and what to do about it."""
+    """The kind of a file with this beginning, and a remedy."""
     if not head:
         return "empty file", "give a pcapng capture"
     if head[:4] in CLASSIC_PCAP:

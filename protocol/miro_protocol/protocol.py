@@ -47,14 +47,14 @@ class Protocol(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_only=
         raise NotImplementedError
 
     def decode(self, wire: bytes) -> list[Frame | Damage]:
-        """What a receiver finds in characters that follow each other, in their order. Raises nothing."""
+        """Decodes consecutive characters as a receiver does. Raises nothing."""
         raise NotImplementedError
 
     def repair(self, body: bytes, number: int | None = None) -> bytes:
-        """The frame that comes closest to `body`, whatever that is. Raises nothing.
+        """The frame nearest to `body`, for any bytes. Raises nothing.
 
-        `number`: the frame is so many frames after the first one of its session; a format with sequence numbers puts
-        the right one in. None: those that stand in the body stay.
+        `number`: index of the frame in its session, from which a format with sequence numbers computes the right one.
+        None: the body's own numbers stay.
         """
         raise NotImplementedError
 

@@ -1,4 +1,4 @@
-"""What a robot makes of the characters that its serial port receives: frames, fresh or not, and damage.
+"""Decodes the characters that a robot's serial port receives: frames, fresh or not, and damage.
 
 The rule (README.md, "Freshness"): a frame is fresh if its number is 1 to 8 steps (mod 64) past the last
 fresh one. 150 ms or more after that one, any other number is fresh; before the first frame, any at all.
@@ -76,15 +76,15 @@ class RobotReceiver:
         return f"RobotReceiver({self.decoder!r}, {self.freshness!r})"
 
     def hear(self, sent: Transmission) -> Sequence[Reception]:
-        """What the characters of a transmission complete."""
+        """The frames and damage that the characters of a transmission complete."""
         return self._judged(self.decoder.hear(sent))
 
     def character(self, value: int, good_stop: bool, ri_tick: int) -> Sequence[Reception]:
-        """What a character completes for which the port sets RI at `ri_tick`: in its stop bit."""
+        """The frames and damage completed by a character for which the port sets RI at `ri_tick`, in its stop bit."""
         return self._judged(self.decoder.feed_symbols([(value, good_stop, ri_tick - TO_RI_TICKS)]))
 
     def flush(self) -> Sequence[Reception]:
-        """What the characters are that wait for others: nothing more comes."""
+        """The frames and damage in the pending characters when no more will come."""
         return self._judged(self.decoder.flush())
 
     def _judged(self, events: Iterable[Event]) -> list[Reception]:

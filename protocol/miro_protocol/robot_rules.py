@@ -1,7 +1,7 @@
-"""What a robot owes its host: each rule once, as arithmetic over the ticks of what happened.
+"""A robot's obligations to its host: each rule once, as arithmetic over the ticks of events.
 
-The checks of a run, the fuzzer's oracle and the trials of `mirotwin conform` judge by these; what they look at and how
-they tell of it is theirs. `tests/naive/robot_rules.py` says the same slowly, over a whole history.
+The checks of a run, the fuzzer's oracle and the trials of `mirotwin conform` use these rules with their own
+observations and messages. `tests/naive/robot_rules.py` is a slow version over a whole history.
 
 Ticks of a frame are those of the start bit of its last character, `last_tick`; it ends a character later. A wheel's
 velocity is a word of the radio (1/256 count per sample).
@@ -19,9 +19,9 @@ ACTING_TICKS = 10 * TICKS_PER_MS
 ANSWER_TICKS = 30 * TICKS_PER_MS
 """From a question's last character to that of its answer, which alone takes 18.7 ms."""
 TOLERANCE_TICKS = TICKS_PER_MS // 2
-"""Of the failsafe's times: one and a half LM629 samples."""
+"""Tolerance of the failsafe's times: one and a half LM629 samples."""
 TESTING_TICKS = 2 * TICKS_PER_MS
-"""How long the test of a frame may put the failsafe off; the shipped firmware takes up to 1.5 ms for five robots."""
+"""Longest delay of the failsafe by the test of a frame; the shipped firmware takes up to 1.5 ms for five robots."""
 TO_RI_TICKS = 9 * ROBOT_BIT_TICKS + ROBOT_BIT_TICKS * 10 // 16 + ROBOT_BIT_TICKS // 32
 """From a character's start bit to RI: 9 10/16 bits, and half of the sixteenth by which the port may see it late."""
 TO_TI_TICKS = 9 * ROBOT_BIT_TICKS
@@ -34,12 +34,12 @@ _CHARACTER, _NEVER, _ANSWER_SIZE = HOST_CHARACTER_TICKS, NEVER_TICK, TELEMETRY.w
 
 
 class SilenceRule:
-    """So long after the last fresh frame both wheels are stopped, or off, within a tolerance.
+    """The failsafe: after a time without a fresh frame both wheels must be stopped, or off, within a tolerance.
 
-    A robot may count from the start or from the end of the frame's last character. One that receives characters when
-    the time comes may be testing a frame, which may be the fresh one: it has `TESTING_TICKS` more. `last_tick`, which
-    who judges sets: of the last fresh frame, -1 before the first and once its silence is judged; `received_tick`: of
-    the last character.
+    A robot may count from the start or from the end of the frame's last character. A robot that receives characters at
+    that time may be testing a frame, which may be fresh: it has `TESTING_TICKS` more. `last_tick`, which the caller
+    sets: of the last fresh frame, -1 before the first and once its silence is judged; `received_tick`: of the last
+    character.
     """
 
     NOT_STATE = ("*",)
@@ -59,7 +59,7 @@ class SilenceRule:
         return self.last_tick + max(self.after_ticks - self.tolerance_ticks, 0)
 
     def latest_tick(self) -> int:
-        """When the time of a robot that tests no frame is over."""
+        """End of the tolerance for a robot that tests no frame."""
         return self.end_tick() + self.after_ticks + self.tolerance_ticks
 
     def received(self, tick: int) -> None:
@@ -68,7 +68,7 @@ class SilenceRule:
             self.received_tick = tick
 
     def deadline(self) -> int:
-        """When the time is over, with the test of a frame that may be under way."""
+        """End of the tolerance, including the test of a frame that may be under way."""
         latest = self.latest_tick()
         begun = latest - self.tolerance_ticks - _TESTING
         return latest + _TESTING if begun <= self.received_tick <= latest else latest
@@ -87,9 +87,10 @@ class SilenceRule:
 
 
 class DrivingRule:
-    """Wheels are told to turn only within `within_ticks` of a fresh frame, and what a fresh team frame says in time.
+    """Wheels may be ordered to turn only within `within_ticks` of a fresh frame, and must get a fresh team frame's
+    velocities in time.
 
-    `fresh_tick`, which who judges sets: of the last fresh frame of any type, -1 before the first; `deadline`: of the
+    `fresh_tick`, set by the caller: of the last fresh frame of any type, -1 before the first; `deadline`: of the
     first team frame that waits.
     """
 
@@ -101,22 +102,22 @@ class DrivingRule:
         self.begin()
 
     def begin(self) -> None:
-        """No frame has come yet."""
+        """Resets the rule: no frame has come yet."""
         self.fresh_tick = -1
         self.deadline = _NEVER
         self.waiting.clear()
 
     def may_move(self, tick: int) -> bool:
-        """True if a wheel may be told to turn at `tick`."""
+        """True if a wheel may be ordered to turn at `tick`."""
         return self.fresh_tick >= 0 and tick - self.fresh_tick <= self.within_ticks
 
     def team(self, tick: int, left: int, right: int) -> None:
-        """Wheels have to be told this, of a fresh team frame."""
+        """Sets the velocities of a fresh team frame, which the wheels must be ordered to have."""
         self.waiting.append((tick + self.within_ticks, left, right))
         self.deadline = self.waiting[0][0]
 
     def told(self, left: int, right: int) -> None:
-        """The wheels are told this now: that frame is obeyed, and those before it are past."""
+        """The wheels are ordered to these velocities now: their frame is obeyed, and earlier ones are done."""
         for place in range(len(self.waiting) - 1, -1, -1):
             if self.waiting[place][1:] == (left, right):
                 del self.waiting[: place + 1]
@@ -146,7 +147,7 @@ class OriginRule:
         self.frames.append((tick, left, right))
 
     def allows(self, tick: int, left: int, right: int) -> bool:
-        """True if the wheels may be told this at `tick`, which does not go back."""
+        """True if the wheels may be ordered to these velocities at `tick`, which must not decrease."""
         while self.frames and self.frames[0][0] < tick - self.within_ticks:
             self.frames.popleft()
         allowed = False
@@ -158,8 +159,8 @@ class OriginRule:
 class AnswerRule:
     """One answer a question, with its number and in time; without a question silence.
 
-    `asked_tick`, `asked_seq`: the question that waits, the tick NEVER_TICK without one. A question that comes while
-    one waits need not be answered. `last_seq`, `before_seq`: the last two questions, -1 for none; `allowed`: characters
+    `asked_tick`, `asked_seq`: the pending question; the tick is NEVER_TICK without one. A question that comes while one
+    waits need not be answered. `last_seq`, `before_seq`: the last two questions, -1 for none; `allowed`: characters
     that may still be sent.
     """
 
@@ -170,7 +171,7 @@ class AnswerRule:
         self.begin()
 
     def begin(self) -> None:
-        """Nothing was asked yet."""
+        """Resets the rule: no question has come yet."""
         self.asked_tick = _NEVER
         self.asked_seq = -1
         self.last_seq = -1
@@ -208,7 +209,7 @@ class AnswerRule:
         return late if late > 0 else 0
 
     def missed(self, tick: int) -> int:
-        """When the question that waits had to be answered, if that was before `tick`: it waits no longer. Else -1.
+        """Deadline of the pending question if it was before `tick`, and drops the question; else -1.
 
         An answer is known only when TI is set for its last character.
         """

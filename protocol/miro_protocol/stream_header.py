@@ -25,7 +25,7 @@ PREFIX = "#:"
 
 
 class Header(msgspec.Struct, frozen=True, kw_only=True):
-    """What a stream file says about itself; None where it does not. `text` is the document, without prefixes.
+    """The header of a stream file; a missing key is None. `text` is the document, without prefixes.
 
     `scenario`: the name of a built-in scenario, or a whole one. `set`: changes to the scenario, by the path of a key.
     `expect`: checks, as in a scenario. `verdict`: what the one of them said that failed, `end_tick`: where that run

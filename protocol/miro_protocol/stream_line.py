@@ -1,4 +1,4 @@
-"""One line of a stream file: what happens at a tick, as text and back.
+"""Parses and writes one line of a stream file: an event at a tick.
 
     792000 > 55 55 ff 2d d4        characters from the host of network 0
     792000 <@1 55 55! ff           ... from a robot of network 1; the second one has a bad stop bit
@@ -79,7 +79,7 @@ _T = TypeVar("_T")
 
 @dataclass(frozen=True, slots=True)
 class Entry:
-    """What one line says, the comment after it, and the number of the line (0: of no file)."""
+    """The content of a line, its comment, and the number of the line (0: not from a file)."""
 
     what: StreamItem
     comment: str = ""
@@ -170,7 +170,7 @@ class StreamLine:
         return StreamError(self.source, self.number, column, reason, remedy)
 
     def version(self) -> int:
-        """What the first line of a file says; 1 if it says nothing."""
+        """The version in the first line of a file; 1 if there is none."""
         match = _VERSION.match(self.text)
         if match is None:
             return 1
@@ -182,7 +182,7 @@ class StreamLine:
         return int(version)
 
     def parse(self, version: int, crystal_hz: int = TICKS_PER_SECOND) -> Entry | None:
-        """What the line says, or None for a line that says nothing. `crystal_hz`: ticks a second."""
+        """The entry of a line; None for an empty line or a comment. `crystal_hz`: ticks per second."""
         if not self.tokens:
             return None
         tick = self._tick(self.tokens[0], crystal_hz)

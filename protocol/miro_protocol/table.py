@@ -78,7 +78,7 @@ FLAG_MEANINGS = {
 
 @dataclass(frozen=True, slots=True)
 class Field:
-    """One little-endian number of a payload. `low` and `high` are what may be sent, often less than fits."""
+    """One little-endian number of a payload. `low` and `high`: limits of sent values, often narrower than the field."""
 
     name: str
     size: int
@@ -98,7 +98,7 @@ class Field:
 
 @dataclass(frozen=True, slots=True)
 class Format:
-    """How one kind of frame lies on the wire. Sizes and offsets are in characters."""
+    """The layout of one kind of frame. Sizes and offsets are in characters."""
 
     name: str
     lead: bytes  # preamble for the slicer, then FFh so that the UART finds a true start edge

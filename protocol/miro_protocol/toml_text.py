@@ -29,7 +29,7 @@ TYPE_NAMES = {
     "array": "a list",
     "object": "a table",
 }
-"""What msgspec calls types, in the words of TOML."""
+"""Names of types in msgspec -> in the words of TOML."""
 _KEY_PART = r"""(?:[\w-]++|"[^"\n]*+"|'[^'\n]*+')"""
 _LONG_KEY = re.compile(rf"(?<![\w-]){_KEY_PART}(?:[ \t]*+\.[ \t]*+{_KEY_PART}){{{KEY_PARTS}}}")
 _NAMED = "[...]"
@@ -78,7 +78,10 @@ def check_size(text: str) -> None:
 
 
 def value_of(text: str, path: str) -> Any:
-    """What a text means as the value of the key at `path`: as TOML, or itself if it is none. Raises TomlError."""
+    """The value of a text for the key at `path`: parsed as TOML, or the text itself if it is not TOML.
+
+    Raises TomlError.
+    """
     check_size(f"{path} = {text}")
     try:
         parsed = tomllib.loads(f"value = {text}")
@@ -116,7 +119,7 @@ def struct_of(table: Any, kind: type[T], strict: bool = True) -> T:
 
 
 def what_and_path(message: str) -> tuple[str, str]:
-    """What msgspec found, and the path of the key, without its `$`."""
+    """msgspec's message, and the path of the key without its `$`."""
     match = re.fullmatch(r"(?s)(.*?)(?: - at `(?:\$|key in )?\.?(.*)`)?", message)
     assert match is not None
     return match[1], match[2] or ""
@@ -150,7 +153,7 @@ def _fault(table: Any, kind: type) -> str:
 
 
 def _misfit(problem: str, path: str, keys: Sequence[str]) -> TomlError:
-    """What msgspec found, in the words of the file. `keys`: those of the table, if they are known."""
+    """msgspec's message in the words of the file. `keys`: the keys of the table, if they are known."""
     field = re.fullmatch(r"(?s)Object (contains unknown|missing required) field `(.*)`", problem)
     if field is not None:
         place = f"{path}.{field[2]}" if path else field[2]

@@ -97,7 +97,7 @@ def of_symbols(
 
 
 def joined(first: Transmission, other: Transmission) -> Transmission | None:
-    """Both as one transmission, or None unless `other` goes on where `one` ends."""
+    """Both as one transmission; None unless `other` begins where `first` ends."""
     step = character_ticks(first.direction)
     if (first.network, first.direction) != (other.network, other.direction):
         return None

@@ -34,7 +34,9 @@ from miro_robot.wiring import CHIP_INPUTS, CONSTANT_BANK, PORTS, SIDES, Wiring
 MAIN_LOOP_LIMIT_CYCLES = 20_000
 """10 ms without main loop are a fault: a third of a camera frame is lost."""
 FAULTS_KEPT = 1000
-"""A firmware that faults in a loop must not fill the memory: after so many, faults are counted only."""
+"""Number of faults that are recorded; further ones are only counted, so that a loop of faults does not fill
+the memory.
+"""
 
 _ADDRESS, _RELEASE, _DATA, _STROBE = 8, 10, 11, 12
 _SAMPLE, _STROBE_ENDS, _DATA_ENDS, _PAGE_ENDS = 17, 18, 19, 20
@@ -191,7 +193,9 @@ class Board(ProcessorBoard):
         return stopped
 
     def _next_interrupt(self, chip: Lm629) -> int:
-        """The next tick at which HI may change by itself: an unmasked sample, the end of reset, or its own end."""
+        """The next tick at which HI may change without the CPU: an unmasked sample, the end of reset, or its
+        own end.
+        """
         if chip.sample_tick == NEVER_TICK:
             return chip.next_tick
         return min(chip.hi_falls_tick, chip.sample_tick if chip.signals.mask else NEVER_TICK)
@@ -282,7 +286,7 @@ class Board(ProcessorBoard):
             self.probe.moved(tick)
 
     def _note_stuck(self) -> None:
-        """The shorted pins that something is wired to: what the board has of the others nobody sees."""
+        """Marks the shorted pins that are wired to something; the effect on other pins cannot be observed."""
         self.stuck = 0
         for port in range(PORTS):
             self.low_pins[port] = self.stuck_low[port] & self.watched[port]
@@ -457,7 +461,7 @@ class Board(ProcessorBoard):
             self.probe.moved(tick)
 
     def _watch_bus(self, both_drive: int, tick: int) -> None:
-        """What the firmware must not do to the LM629: write while busy, read two chips at once."""
+        """Detects forbidden accesses to the LM629s: writing while busy, reading two chips at once."""
         busy_writes = self.left.writes_while_busy + self.right.writes_while_busy
         if busy_writes != self.busy_writes:
             self.busy_writes = busy_writes

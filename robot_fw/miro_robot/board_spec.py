@@ -1,4 +1,4 @@
-"""What a board is: its processor, crystal and memories, and the parts that are wired to it (`NAME.board.toml`)."""
+"""The specification of a board: processor, crystal, memories, and the parts wired to it (`NAME.board.toml`)."""
 
 from __future__ import annotations
 

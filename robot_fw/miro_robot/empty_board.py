@@ -27,7 +27,9 @@ from miro_robot.mcs51.uart import STOPPED_TICK
 from miro_robot.processor_board import ProcessorBoard
 
 FAULTS_KEPT = 1000
-"""A firmware that faults in a loop must not fill the memory: after so many, faults are counted only."""
+"""Number of faults that are recorded; further ones are only counted, so that a loop of faults does not fill
+the memory.
+"""
 _CHECK_CYCLES = 200_000  # after which a jump to itself that interrupts left is looked at again
 _EA, _SOURCES = 0x80, 0x3F  # of IE
 _IE = 0xA8
@@ -125,7 +127,7 @@ class EmptyBoard(ProcessorBoard):
         return self._run((), until_tick)
 
     def run_to_any(self, addresses: tuple[int, ...], until_tick: int) -> int:
-        """Like `run`, but notes REACHED before each instruction at one of `addresses`, and goes on."""
+        """Like `run`, but notes REACHED before each instruction at one of `addresses`, and continues."""
         return self._run(addresses, until_tick)
 
     def _run(self, addresses: tuple[int, ...], until_tick: int) -> int:
@@ -179,7 +181,7 @@ class EmptyBoard(ProcessorBoard):
         return reason
 
     def _may_wake(self) -> bool:
-        """True if a level on a pin may come that nobody has announced."""
+        """True if the level of a pin may change without announcement."""
         return self.input_tick != NEVER_TICK
 
     def _sleep_on(self, until_cycle: int) -> None:
@@ -201,7 +203,7 @@ class EmptyBoard(ProcessorBoard):
             self.ends = tuple([end for end in self.ends if end != address])
 
     def _step(self) -> None:
-        """One instruction."""
+        """Executes one instruction."""
         self.cpu.step()
 
     def _look_for_ends(self) -> None:
@@ -210,7 +212,7 @@ class EmptyBoard(ProcessorBoard):
         self.next_check = self.cpu.cycles + _CHECK_CYCLES
 
     def marks(self) -> tuple[int, ...]:
-        """Where it sets marks itself, for each run: for the debugger."""
+        """Addresses at which the board itself sets marks, for each run: for the debugger."""
         return (*self.ends, *self.stop_at)
 
     def _code_at(self, address: int) -> int:
@@ -323,7 +325,7 @@ class EmptyBoard(ProcessorBoard):
         self._store(address, value)
 
     def movx_without_strobe(self, address: int, write: int) -> None:
-        """A fault on boards that are described: on a bare processor nobody says what P3.6 and P3.7 are for."""
+        """Reports a fault on described boards only: for a bare processor the use of P3.6 and P3.7 is unknown."""
         if self.spec.of_file and not self.forced:
             detail = f"MOVX {'write' if write else 'read'} of {address:#06x}, P3.{6 if write else 7} is 0"
             self._note_fault(_MOVX_WITHOUT_STROBE, self.cpu.at, self.cpu.cycles * CYCLE_TICKS, detail)
@@ -381,7 +383,7 @@ class EmptyBoard(ProcessorBoard):
             self._note_fault(kind, pc, tick, self._stack_said() if kind in STACK_FAULTS else "")
 
     def _stack_said(self) -> str:
-        """Where SP is and where the stack may be, and what says so if no map does."""
+        """Text with SP and the range of the stack, and the source of that range if it is not the map."""
         source = self.image.symbols.stack_source if self.spec.bound_stack else ""
         return f"{self.cpu.stack_said()}{f' by {source}' if source else ''}"
 

@@ -1,6 +1,6 @@
-"""What happened on a robot's board, with exact ticks: the log that waits, checks and fuzzing read.
+"""The log of events on a robot's board, with exact ticks: waits, checks and fuzzing read it.
 
-The log is no state: it changes no bit of a run, and a board that is restored begins a new one.
+The log is no state: it changes no bit of a run, and a restored board begins a new one.
 
     kind        code                       value
     RECEIVED    stop bit good (1) or not   the character that the serial port delivered

@@ -1,6 +1,6 @@
-"""What firmware must not do: the kinds of fault, and the record of one.
+"""The kinds of firmware fault, and the record of one.
 
-They are found by CPU, LM629 and board; the scenario says whether a fault stops the run.
+CPU, LM629 and board detect them; the scenario defines if a fault stops the run.
 """
 
 from __future__ import annotations
@@ -44,9 +44,9 @@ DESCRIPTIONS = {
 
 
 class FirmwareFault(msgspec.Struct, frozen=True):
-    """One fault: what, when (tick of 24 MHz), at which instruction, inside which symbol ("" if unknown).
+    """One fault: kind, tick of 24 MHz, address of the instruction, symbol around it ("" if unknown).
 
-    `detail` is for people: by how much, where there is more to say than the kind.
+    `detail`: further text for people, such as an amount.
     """
 
     kind: FaultKind

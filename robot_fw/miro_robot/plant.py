@@ -1,4 +1,4 @@
-"""What the robot's electronics are wired to: the seam between the board and the physical world.
+"""The interface between the robot's board and the physical world.
 
 Time is in ticks of the 24 MHz crystal.
 """

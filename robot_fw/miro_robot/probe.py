@@ -1,4 +1,4 @@
-"""What a board reports to a recorder of its wires, with exact ticks.
+"""A board's reports to a recorder of its wires, with exact ticks.
 
 A probe reads levels off the board and its chips and changes nothing; a board without one pays a test per event.
 """
@@ -13,7 +13,7 @@ class Probe:
         """The CPU has changed pins of an LM629 at `tick`; all levels of the board are those of `tick`."""
 
     def hi_fell(self, tick: int) -> None:
-        """HI of a chip fell by itself at `tick`. The plant may be behind, and the CPU's pins ahead of that."""
+        """HI of a chip fell on its own at `tick`. The plant may be behind, and the CPU's pins ahead of that."""
 
     def passed(self, tick: int) -> None:
         """Plant and chips have done all that happens up to `tick`; levels are those of `tick`.

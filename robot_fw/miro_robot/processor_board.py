@@ -1,6 +1,6 @@
-"""What every board with a processor has: a log of its events, the faults of its firmware, and runs to marks.
+"""The base of every board with a processor: a log of its events, the faults of its firmware, and runs to marks.
 
-What is wired to the processor is a subclass's: `board.py` has the robot's two LM629, `empty_board.py` external RAM.
+Subclasses add the circuit: `board.py` has the robot's two LM629, `empty_board.py` external RAM.
 """
 
 from __future__ import annotations
@@ -45,7 +45,7 @@ class ProcessorBoard(Bus):
         raise NotImplementedError
 
     def run_to_any(self, addresses: tuple[int, ...], until_tick: int) -> int:
-        """Like `run`, but notes REACHED before each instruction at one of `addresses`, and goes on."""
+        """Like `run`, but notes REACHED before each instruction at one of `addresses`, and continues."""
         cpu = self.cpu
         while True:
             cpu.mark(addresses)
@@ -83,7 +83,7 @@ class ProcessorBoard(Bus):
         raise NotImplementedError
 
     def _hold_pin(self, port: int, bit: int, level: int, outside: int) -> None:
-        """What the processor has of it. `outside`: on the pins of that port."""
+        """Sets the processor's view of a shorted pin. `outside`: on the pins of that port."""
         mask = 1 << bit
         self.stuck_low[port] = self.stuck_low[port] & ~mask | (mask if level == 0 else 0)
         self.stuck_high[port] = self.stuck_high[port] & ~mask | (mask if level == 1 else 0)

@@ -1,4 +1,4 @@
-"""What the fast `Board` knows of a board file: where each pin of its two LM629 comes from, or leads to.
+"""The wiring of the fast `Board` from a board file: the source or target of each pin of its two LM629.
 
 A board file (`NAME.board.toml`) says who shares a net; here it is point to point: an input pin of an LM629 or of the
 CPU on the left, its source on the right. Sources are port pins (`P2.3`), bits of an output latch that MOVX writes
@@ -114,7 +114,7 @@ class _Chip(msgspec.Struct, frozen=True):
 
 
 class _BoardFile(msgspec.Struct, frozen=True):
-    """What of a board file concerns the fast board; the rest is looked at by whoever builds all parts."""
+    """The part of a board file that concerns the fast board; the rest is read by the code that builds all parts."""
 
     crystal_hz: int
     name: str = "board"

@@ -1,9 +1,7 @@
-"""What one control period of the world leaves behind: the records that recording, summary, figure and
-replay read.
+"""The records of one control period of the world, for recording, summary, figure and replay.
 
-One period is one camera frame, 800800 ticks of 24 MHz. Everything in a `RobotPeriod` is taken at the tick
-of the period's exposure, before the host acts on it, except `control`, which is what the host answers to
-it.
+One period is one camera frame, 800800 ticks of 24 MHz. Everything in a `RobotPeriod` is taken at the tick of the
+period's exposure, before the host acts on it, except `control`, which is the host's output for it.
 """
 
 import msgspec
@@ -37,7 +35,7 @@ class Axis(msgspec.Struct, frozen=True, gc=False):
 
 
 class Control(msgspec.Struct, frozen=True, gc=False):
-    """What the controller made of one measurement: z_cmd after its limits, the wheel split, and the law's inner values.
+    """The controller's output for one measurement: z_cmd after its limits, the wheel split, and the law's inner values.
 
     `left`, `right` in 1/256 count per LM629 sample, before the control noise of the scenario; `inner` by name, as the
     law declares them (`u1` in m/s^2, `u2` in rad/s^2, `s1` in m/s, `s2` in rad/s of equations (13), (16)); `estimate`

@@ -3,20 +3,19 @@
 The state is the posture at the last exposure and one factor per wheel, which is its radius over the nominal one. In
 each control period:
 
-    1. The command of one period ago is remembered with the speeds at which its effect finds the wheels.
+    1. The command of one period ago is stored with the wheel speeds at the begin of its effect.
     2. A new measurement moves the state to its exposure (prediction) and corrects it (update).
-    3. A copy of the state is moved on to the effect of the command that is about to be computed. It is handed out.
+    3. A copy of the state is predicted to the effect of the next command, and returned.
 
 A command that is computed at t takes effect at t + dead_s + lag_s: the lag of the wheels is taken as a delay. So the
-commands known at t determine all that the robot does until the next one takes effect. Whether the radio lost one is
-not known. So the state grows uncertain by a share `doubt` of what a command changes, and by nothing while commands
-stay as they are.
+commands known at t determine all that the robot does until the next one takes effect. Lost commands are unknown. So the
+uncertainty grows by a share `doubt` of each change of the command, and not while commands are constant.
 
-What a measurement may be, besides good:
+Measurements that are not used:
 
     None                      not found: the filter predicts. The state stays at the last exposure as long as the
                               commands since then are remembered (16 periods), then it is moved on.
-    same or older exposure    ignored: a frame that the grabber repeats holds nothing new.
+    same or older exposure    ignored: a frame repeated by the grabber has no new data.
     far from the prediction   refused: its distance in standard deviations, sqrt(e^T S^-1 e) with S the covariance of
                               the innovation e = (x, y, theta), is above `gate`. When `REFUSED` measurements in a row
                               are far, the robot is somewhere else: the posture starts again, the factors stay.
@@ -39,13 +38,14 @@ from miro_host.posture import Posture
 from miro_host.wheels import Wheels
 
 REFUSED = 5
-"""So many measurements in a row are far from the prediction before the filter gives its posture up."""
+"""Consecutive measurements far from the prediction after which the filter restarts its posture."""
 LEAST_CONFIDENCE = 0.1
 WHEELS = Wheels()
 SEEN_NOISE = (0.001, 0.1)
 """Standard deviations of a `Sighting` in m and rad. The tracker's errors of 0.5 mm and 0.014 rad change little from
-frame to frame: to a filter that knows white noise only, a heading that is wrong alike for 25 frames is wrong by
-sqrt(50) times as much in each."""
+frame to frame: for a filter that assumes white noise, the same heading error in 25 frames counts as sqrt(50) times that
+error in each.
+"""
 TOLD_NOISE = (0.0081, 0.028)
 """Of any other posture: a third of the bounds in section V-A of the paper, and whole pixels."""
 
@@ -53,17 +53,17 @@ TOLD_NOISE = (0.0081, 0.028)
 class EkfParameters(EstimatorParameters, frozen=True, kw_only=True, tag="ekf"):
     """Parameters of the filter; all noise is given as standard deviations.
 
-    Timing: `age_s` from exposure to arrival of a measurement that does not tell its exposure; `dead_s` from arrival to
-    the end of the frame, left out: what the pilot says of its network; `lag_s` from there to the wheels' speed
-    (firmware, LM629, motor; 2 to 4 ms fit a robot equally well); `slope_m_s2` of the LM629's speed.
+    Timing: `age_s` from exposure to arrival of a measurement without its exposure time; `dead_s` from arrival to the
+    end of the frame, left out: the pilot's value for its network; `lag_s` from there to the wheels' speed (firmware,
+    LM629, motor; 2 to 4 ms fit a robot equally well); `slope_m_s2` of the LM629's speed.
 
-    Camera: `position_noise_m` per axis, `heading_noise_rad`; left out: `SEEN_NOISE` for what comes with the tick of its
-    exposure, as from the cameras `pixels` and `geometric`, and `TOLD_NOISE` for any other posture.
+    Camera: `position_noise_m` per axis, `heading_noise_rad`; left out: `SEEN_NOISE` for measurements with the tick of
+    their exposure, as from the cameras `pixels` and `geometric`, and `TOLD_NOISE` for any other posture.
 
     Robot, per square root of a second: `position_drift_m` per axis, `heading_drift_rad`, `wheel_drift` of each factor.
-    `wheel_spread` is the standard deviation of a factor at the beginning: an even spread of 1.5 % has 0.0087. `doubt`
-    is the share of a command's change that is in doubt: a frame in fifty is lost, and 0.14 is the root of that.
-    `rim_noise_m_s` is how far a rim's mean speed in one period is from what was commanded.
+    `wheel_spread` is the standard deviation of a factor at the beginning: an even spread of 1.5 % has 0.0087. `doubt`:
+    the uncertain share of a command's change; one frame in fifty is lost, and 0.14 is the root of that.
+    `rim_noise_m_s`: deviation of a rim's mean speed in one period from the commanded speed.
     """
 
     age_s: Annotated[float, Meta(ge=0.0, le=0.25)] = 1001.0 / 30000.0
@@ -84,7 +84,7 @@ class EkfParameters(EstimatorParameters, frozen=True, kw_only=True, tag="ekf"):
         return Ekf(self)
 
     def filter(self, size: int, *warp: float) -> Filter:
-        """A filter with these parameters, as it is before its first period."""
+        """A new filter with these parameters, before its first period."""
         drifts = (self.position_drift_m, self.heading_drift_rad, self.wheel_drift, self.rim_noise_m_s)
         motion = Motion(WHEELS.track_m, self.slope_m_s2, self.doubt)
         return Filter(size, motion, self.wheel_spread, drifts, *warp)
@@ -148,7 +148,7 @@ class Ekf(Estimator[EkfParameters]):
         return dict(zip(self.INNER, values, strict=True))
 
     def _measure(self, given: EstimatorInput) -> None:
-        """Takes what has arrived."""
+        """Processes the arrived measurement."""
         if given.measured is not None:
             self._see(given.measured, given.t_s)
 

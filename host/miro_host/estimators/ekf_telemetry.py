@@ -1,11 +1,10 @@
-"""The filter of `ekf` with the encoder counts that the robots' answers bring.
+"""The filter of `ekf` with the encoder counts in the robots' answers. What each source measures, and what only both
+together show:
 
-What each of them sees, and what only both do:
-
-    commands    what the wheels should do: known at once, not known to be obeyed
-    encoders    what the wheels did, every third or fifth period, some 35 ms late. Alone they never see a shift or a
-                turn of the whole pitch, and scale only as far as the wheel radius is known
-    camera      where the robot is, displaced by the warp of a wrong calibration
+    commands    the desired motion of the wheels: known at once, but possibly not obeyed
+    encoders    the actual motion of the wheels, every third or fifth period, some 35 ms late. Alone they never show a
+                shift or a turn of the whole pitch, and show scale only as far as the wheel radius is known
+    camera      the robot's position, displaced by the warp of a wrong calibration
 
     wheel factor    camera and encoders differ by the same share of the way, everywhere
     slip            they differ in a burst: the wheels turned and the robot did not follow
@@ -14,14 +13,14 @@ What each of them sees, and what only both do:
     disobedience    encoders and commands differ: lost frames, noise on the commands, a motor at its limit, contact.
                     Until the next count it looks like slip
 
-An answer's counts were read at one instant. The filter is moved there and corrected by what each rim went since the
-last count beyond what was commanded. Of the way modulo 65536 counts (0.50 m) the value nearest to the commanded way is
-taken, so that a long silence does no harm as long as the commands were obeyed within 0.25 m.
+An answer's counts were read at one instant. The filter is moved to that time and corrected by the difference between
+each rim's way and the commanded way since the last count. The way is known modulo 65536 counts (0.50 m); the value
+nearest to the commanded way is used, so a long silence does no harm if the commands were obeyed within 0.25 m.
 
-An answer may also be old or repeated (ignored), come before the posture is known (it is where counting begins), tell of
-an instant before the last exposure (the next one tells more), or tell what no robot did, `count_gate` standard
-deviations off, as after a reset of the robot, whose counts begin at 0 (counting begins there). Without answers this is
-`ekf`, but for its default of `rim_noise_m_s`.
+An answer may also be old or repeated (ignored), come before the posture is known (counting begins there), be read
+before the last exposure (the next one is used), or be impossible by `count_gate` standard deviations, as after a reset
+of the robot, whose counts begin at 0 (counting begins there). Without answers this is `ekf`, but for its default of
+`rim_noise_m_s`.
 """
 
 import math
@@ -48,10 +47,10 @@ Of white noise the mean has a standard deviation of 0.42."""
 
 
 class EkfTelemetryParameters(EkfParameters, frozen=True, kw_only=True, tag="ekf+telemetry"):
-    """Those of `ekf`, and: `sampled_s`, how long before its answer's first start bit a robot reads its counts (the left
-    one 0.95 ms, the right one 0.65 ms before); `count_noise_m`, standard deviation of a rim's way between two counts,
-    for rounding and for that instant; `count_gate`, in standard deviations; `warp_m` of the camera's displacement per
-    axis and `warp_length_m`, the way over which it becomes another. A `warp_m` of 0 is a camera that is right.
+    """Those of `ekf`, and: `sampled_s`, time between a robot's reading of its counts and its answer's first start bit
+    (0.95 ms for the left one, 0.65 ms for the right one); `count_noise_m`, standard deviation of a rim's way between
+    two counts, for rounding and for that instant; `count_gate`, in standard deviations; `warp_m` of the camera's
+    displacement per axis and `warp_length_m`, the way over which it changes. A `warp_m` of 0 is a correct camera.
     """
 
     rim_noise_m_s: Annotated[float, Meta(ge=0.0, le=1.0)] = 0.02
@@ -69,9 +68,9 @@ class EkfTelemetryParameters(EkfParameters, frozen=True, kw_only=True, tag="ekf+
 
 
 class EkfTelemetry(Ekf):
-    """The filter, the last answer that was used, and the counts then; the last exposure, and the slip at it.
+    """The filter, the last used answer with its counts, the last exposure, and the slip at it.
 
-    `slip_m_s` is how much faster the wheels go than the robot, averaged over some frames; 0 while nothing surprises.
+    `slip_m_s`: speed of the wheels minus that of the robot, averaged over some frames; 0 while deviations are small.
     """
 
     STATE: ClassVar[Mapping[str, Any]] = {
@@ -102,7 +101,7 @@ class EkfTelemetry(Ekf):
         return super()._named(posture, state, self.slip_m_s, state[7], state[8])
 
     def _measure(self, given: EstimatorInput) -> None:
-        """The camera's measurement and a new answer, in the order of the instants that they tell of."""
+        """Processes the camera's measurement and a new answer, in the order of their times."""
         telemetry = given.telemetry
         if telemetry is None or telemetry.tick <= self.telemetry_tick:
             super()._measure(given)
@@ -134,7 +133,7 @@ class EkfTelemetry(Ekf):
 
     @staticmethod
     def _beyond_m(counts: int, commanded_m: float) -> float:
-        """What a rim went beyond what was commanded, of all that fit its counter the least."""
+        """The way of a rim beyond the commanded one; of the ways that fit its counter the nearest."""
         commanded = commanded_m / METRES_PER_COUNT
         whole = nearest(commanded)
         return ((unwrapped(counts, whole) - whole) + (whole - commanded)) * METRES_PER_COUNT
@@ -146,7 +145,9 @@ class EkfTelemetry(Ekf):
         self.surprise = self.slip_m_s = 0.0
 
     def _believed(self, measured: Posture, noise: tuple[float, float]) -> bool:
-        """Where the camera surprises again and again, the posture is loosened: the wheels are not blamed."""
+        """Raises the posture's uncertainty if the camera deviates again and again, so that the wheels are not
+        blamed.
+        """
         ekf, state = self.filter, self.filter.state
         sin, cos = sincos(state[2])
         x_m, y_m = measured.x_m - state[0] - state[7], measured.y_m - state[1] - state[8]

@@ -1,13 +1,13 @@
-"""A Kalman filter of posture, wheel radii, and what encoders and camera see apart from each other.
+"""A Kalman filter of posture, wheel radii, and the deviations of encoders and camera.
 
     0  x      m    posture at the time `at_s`
     1  y      m
     2  theta  rad
     3  left        radius of the left wheel over the nominal one
     4  right
-    5  extra left  m    what the left rim went since the last encoder count beyond what was commanded
+    5  extra left  m    way of the left rim since the last encoder count minus the commanded way
     6  extra right m
-    7  warp x m    by how much the camera shows the robot displaced here
+    7  warp x m    displacement of the robot in the camera's measurement at this place
     8  warp y m
 
 `size` is how many of them are estimated: 5 without encoders, or 9. The camera measures x + warp x, y + warp y and
@@ -36,7 +36,7 @@ class Filter:
 
     Drift is given as standard deviations per square root of a second: `position_m` per axis, `heading_rad`, `wheel` of
     each factor; `rim_m_s` is the standard deviation of a rim's mean speed in one period from what was commanded. The
-    warp is `warp_m` of standard deviation and forgets itself over `warp_length_m` of way.
+    warp has the standard deviation `warp_m` and decorrelates over `warp_length_m` of way.
     """
 
     STATE = {
@@ -85,7 +85,7 @@ class Filter:
         return f"Filter(known={self.known}, at_s={self.at_s}, state={list(self.state)})"
 
     def after_load(self) -> None:
-        """Raises ValueError for what no step leaves."""
+        """Raises ValueError for values that no step can produce."""
         for index in (3, 4):
             if not 1.0 / _LARGEST <= self.state[index] <= _LARGEST:
                 raise ValueError(f"the wheel factors {list(self.state)[3:5]} are those of no robot")
@@ -158,7 +158,7 @@ class Filter:
             self.covariance[other * _N + index] = 0.0
 
     def run(self, to_s: float) -> None:
-        """Moves a copy of the posture on; the result stands in `motion`."""
+        """Predicts a copy of the posture to `to_s`; the result is in `motion`."""
         motion = self.motion
         motion.begin(self.state[0], self.state[1], self.state[2])
         motion.run(self.at_s, to_s, self.effect_s, self.period_s, self.state[3], self.state[4])
@@ -198,7 +198,8 @@ class Filter:
     def move(self, state: int, other: int) -> None:
         """Multiplies the covariance by F, whose rows (or columns) of x, y and theta change in this order.
 
-        Numbers of two neighbouring states are `state` apart, those of one state with two others `other`.
+        `state`: distance of the numbers of two neighbouring states; `other`: distance of those of one state with two
+        others.
         """
         p = self.covariance
         motion = self.motion
@@ -232,7 +233,9 @@ class Filter:
             p[extra * _N + extra] += variance
 
     def warp_on(self, way_m: float) -> None:
-        """The warp after a way: it forgets a share of itself and varies as much as before."""
+        """Updates the warp after a way: a part of it decays and is replaced by new variance, so the total stays the
+        same.
+        """
         kept = max(1.0 - way_m / self.warp_length_m, 0.0)
         p = self.covariance
         for index in range(7, 9):
@@ -277,7 +280,7 @@ class Filter:
         return cos * cos * p[0] + 2.0 * cos * sin * p[1] + sin * sin * p[_N + 1] + position_m2
 
     def see(self, x_m: float, y_m: float, theta_rad: float, position_m2: float, heading_rad2: float) -> None:
-        """Corrects by what the camera measured."""
+        """Corrects by a measurement of the camera."""
         warp = self.size == _N
         self.correct(0, 7 if warp else NONE, x_m - self.state[0] - self.state[7], position_m2)
         self.correct(1, 8 if warp else NONE, y_m - self.state[1] - self.state[8], position_m2)
@@ -285,9 +288,9 @@ class Filter:
         self.tidy()
 
     def count(self, extra: int, extra_m: float, variance: float, gate: float) -> bool:
-        """Corrects by what a rim went beyond what was commanded since its last count, then counts again.
+        """Corrects by the way of a rim beyond the commanded one since its last count, then restarts counting.
 
-        False, and nothing but the new beginning, if that is more than `gate` standard deviations from expectation.
+        Returns False, and only restarts counting, if the way is more than `gate` standard deviations from expectation.
         """
         innovation = extra_m - self.state[extra]
         believed = innovation * innovation <= gate * gate * (self.covariance[extra * _N + extra] + variance)

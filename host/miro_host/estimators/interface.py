@@ -1,8 +1,8 @@
-"""What a posture estimator is given, and what it answers.
+"""The interface of posture estimators: input and result.
 
 An estimator is two classes, as a law is: a frozen struct of parameters whose tag is its name and whose `estimator`
 method makes it, and a class with `step`. It is called in every control period, also without a measurement, so that it
-can count periods. It sees what the PC could have seen: no true posture.
+can count periods. It gets only data that the PC could have, not the true posture.
 """
 
 from collections.abc import Mapping
@@ -22,12 +22,12 @@ DEAD_S = 0.028
 
 
 class EstimatorInput(msgspec.Struct, frozen=True, gc=False):
-    """What an estimator is given at `t_s` after the start of the reference.
+    """The input of an estimator at `t_s` after the start of the reference.
 
-    `measured` is what the camera's tracker hands over now, None in a frame in which the robot was not found. `v_m_s`,
-    `w_rad_s` are the velocities that were commanded one period ago, `left_m_s`, `right_m_s` the speeds of the rims that
-    were sent for them, for wheels of the nominal radius. `telemetry` is the robot's last answer by radio. `dead_s` is
-    how long after t_s the last bit of the next command leaves the transmitter.
+    `measured`: the tracker's result that arrives now, None for a frame in which the robot was not found. `v_m_s`,
+    `w_rad_s`: velocities commanded one period ago; `left_m_s`, `right_m_s`: the rim speeds sent for them, for wheels of
+    the nominal radius. `telemetry`: the robot's last answer by radio. `dead_s`: time from t_s until the last bit of the
+    next command leaves the transmitter.
     """
 
     t_s: float
@@ -42,10 +42,10 @@ class EstimatorInput(msgspec.Struct, frozen=True, gc=False):
 
 
 class Estimate(msgspec.Struct, frozen=True, gc=False):
-    """A posture and the time it is to be compared with the reference at.
+    """A posture and the time for its comparison with the reference.
 
     `left_factor`, `right_factor` are the radii of the wheels over the nominal one: the command is divided by them.
-    `inner` holds the values that the estimator names; they are recorded, and used by nobody.
+    `inner`: values named by the estimator; they are recorded only.
     """
 
     t_s: float
@@ -57,7 +57,7 @@ class Estimate(msgspec.Struct, frozen=True, gc=False):
 
 @cache
 def _ranges(parameters: type[msgspec.Struct]) -> dict[str, tuple[float, float]]:
-    """The least and the most of each parameter whose annotation says both."""
+    """Smallest and largest value of each parameter whose annotation has both."""
     ranges = {}
     for field in msgspec.structs.fields(parameters):
         for kind in (field.type, *get_args(field.type)):
@@ -82,7 +82,7 @@ class EstimatorParameters(
                 raise ValueError(f"{name}: {value!r} is out of range; must be {least} to {most}")
 
     def estimator(self) -> "Estimator[Any]":
-        """A new estimator with these parameters, as it is before its first period."""
+        """A new estimator with these parameters, before its first period."""
         raise NotImplementedError(f"{type(self).__name__} has no method `estimator`")
 
 
@@ -97,5 +97,5 @@ class Estimator(Remembering, Generic[P]):
     parameters: P
 
     def step(self, given: EstimatorInput) -> Estimate | None:
-        """One control period. None: no posture is known, and the last command is repeated."""
+        """Runs one control period. Returns None if no posture is known; then the last command is repeated."""
         raise NotImplementedError(f"{type(self).__name__} has no method `step`")

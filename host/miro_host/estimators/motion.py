@@ -1,4 +1,4 @@
-"""What a robot does with the commands that were sent, and by how much its end changes with its beginning.
+"""Predicts a robot's motion under the sent commands, with the derivatives of the end by the start.
 
     speed
       ^          to ________________        A command takes effect at time 0 and is held until the next one.
@@ -7,11 +7,11 @@
       +---------+--+---------------+-> t    finished when the next command takes effect.
                 0  ramp            period
 
-Speeds are those of wheels with the nominal radius; a wheel whose radius is that times a factor goes the same way times
-that factor. In one arc the robot goes v = (l fl + r fr) / 2 and turns by w = (r fr - l fl) / track. Its chord has the
-direction theta + w/2 and the length v sin(w/2) / (w/2). The derivative leaves the last quotient as it is; for
-w = 0.1 rad it is 0.9996. While a rim's speed changes the path is no exact circle: a change of both rims by 0.1 m/s in
-opposite senses at 1 m/s costs 0.07 mm.
+Speeds are for wheels with the nominal radius; a wheel with a radius factor goes that way times its factor. In one arc
+the robot goes v = (l fl + r fr) / 2 and turns by w = (r fr - l fl) / track. Its chord has the direction theta + w/2 and
+the length v sin(w/2) / (w/2). The derivative leaves the last quotient as it is; for w = 0.1 rad it is 0.9996. While a
+rim's speed changes the path is no exact circle: a change of both rims by 0.1 m/s in opposite senses at 1 m/s costs 0.07
+mm.
 """
 
 from __future__ import annotations
@@ -25,11 +25,11 @@ _SPEEDS = ("16d", -1e3, 1e3)
 
 
 class Motion:
-    """Remembered commands, the latest first: `*_to_m_s` as sent, `*_start_m_s` when they took effect.
+    """Stored commands, the latest first: `*_to_m_s` as sent, `*_start_m_s` when they took effect.
 
     `run` leaves its results in the other fields: the end `x_m`, `y_m`, `theta_rad`; the ways of the rims, for wheels of
-    the nominal radius, `left_m`, `right_m`; their variances in m2, if `doubt` is the standard deviation of the share of
-    a command's change that is not obeyed; and derivatives, named `of_by`, by heading and factors.
+    the nominal radius, `left_m`, `right_m`; their variances in m2, with `doubt` as standard deviation of the disobeyed
+    share of a command's change; and derivatives, named `of_by`, by heading and factors.
     """
 
     STATE = {
@@ -58,7 +58,7 @@ class Motion:
         return f"Motion(left_to_m_s={list(self.left_to_m_s)}, right_to_m_s={list(self.right_to_m_s)})"
 
     def remember(self, left_m_s: float, right_m_s: float, period_s: float) -> None:
-        """Takes a command, which takes effect when the one before it has been held for a period."""
+        """Stores a command, which takes effect when the one before it has been held for a period."""
         left_start = self.speed(self.left_start_m_s[0], self.left_to_m_s[0], period_s)
         right_start = self.speed(self.right_start_m_s[0], self.right_to_m_s[0], period_s)
         for index in range(_KEPT - 1, 0, -1):
@@ -111,7 +111,7 @@ class Motion:
             index -= 1
 
     def hold(self, index: int, begin_s: float, end_s: float, left_factor: float, right_factor: float) -> None:
-        """One command between two times after its effect, cut where a ramp ends."""
+        """Integrates one command between two times after its effect, split where a ramp ends."""
         left_start = self.left_start_m_s[index]
         left_to = self.left_to_m_s[index]
         right_start = self.right_start_m_s[index]

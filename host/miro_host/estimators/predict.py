@@ -3,8 +3,8 @@
 Prediction goes through the dead time of the loop, from the velocities that were sent.
 
 A measurement is `age_s` old when it arrives, and a command takes effect `ahead_s` after it was computed. Between the
-exposure and the effect of the next command the robot does what was commanded in the last age_s + ahead_s: a known
-sequence of velocities, each held for one period. Each is a circular arc; the robot is taken to follow at once.
+exposure and the effect of the next command the robot executes the commands of the last age_s + ahead_s: a known
+sequence of velocities, each held for one period. Each is a circular arc; the robot is assumed to follow at once.
 """
 
 from typing import Annotated
@@ -81,7 +81,7 @@ class NoEstimator(EstimatorParameters, frozen=True, kw_only=True, tag="none"):
 
 
 class Unchanged(Estimator[NoEstimator]):
-    """Hands on what the camera gives."""
+    """Returns the camera's posture unchanged."""
 
     def step(self, given: EstimatorInput) -> Estimate | None:
         return None if given.measured is None else Estimate(given.t_s, given.measured)

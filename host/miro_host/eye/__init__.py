@@ -1,1 +1,1 @@
-"""What the PC makes of the camera's picture: regions of colour, robots, postures, and the calibration that it needs."""
+"""Processing of the camera's picture on the PC: regions of colour, robots, postures, and calibration."""

@@ -1,4 +1,4 @@
-"""What the PC believes about its camera."""
+"""The PC's calibration of its camera."""
 
 from __future__ import annotations
 
@@ -26,9 +26,9 @@ class Residuals(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_only
 
 
 class Calibration(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_only=True):
-    """Camera parameters as found; `version` of the file's form. With `ignore_height` all is taken to lie on the floor.
+    """Camera parameters as found; `version` of the file's form. `ignore_height`: everything is evaluated on the floor.
 
-    `free` names the parameters that control points told; the others were assumed.
+    `free`: the parameters determined from control points; the others were assumed.
     """
 
     camera: CameraParameters
@@ -42,11 +42,11 @@ class Calibration(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_on
         return Lens(self.camera)
 
     def height_m(self, z_m: float) -> float:
-        """The height at which the tracker evaluates pixels of what is `z_m` above the floor."""
+        """Height at which the tracker evaluates pixels of an object `z_m` above the floor, in metres."""
         return 0.0 if self.ignore_height else z_m
 
     def text(self) -> str:
-        """As TOML, which `read` takes."""
+        """The calibration as TOML for `read`."""
         return eye_file.text(self)
 
 

@@ -1,8 +1,8 @@
 """Calibrations for experiments: the true one, one as wrong as that of 1997 may have been, and none.
 
-The paper tells a worst position error of 2.40 cm and not where it comes from. `drawn_1997` takes it for a calibration
-that is slightly wrong: centre off by about 1 px, focal length by 1 %, tilt by 0.57 degrees, in directions and with a
-sign that differ from seed to seed, all scaled by one factor so that the worst error over the pitch is 2.40 cm.
+The paper gives a worst position error of 2.40 cm without its cause. `drawn_1997` assumes a slightly wrong calibration:
+centre off by about 1 px, focal length by 1 %, tilt by 0.57 degrees, in directions and with a sign that differ from seed
+to seed, all scaled by one factor so that the worst error over the pitch is 2.40 cm.
 """
 
 from __future__ import annotations
@@ -34,10 +34,10 @@ _TWO_PI = 6.283185307179586
 
 
 class CalibrationErrors(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_only=True):
-    """What is wrong with a calibration, each by itself. The first five are added to the true values.
+    """Independent errors of a calibration.
 
-    `focal_share`: of the focal length. `ignore_height`: everything is taken to lie on the floor. `ignore_distortion`:
-    the lens is taken to have none.
+    The first five are added to the true values. `focal_share`: share of the focal length. `ignore_height`: everything
+    is evaluated on the floor. `ignore_distortion`: the lens is assumed to have none.
     """
 
     centre_u_px: float = 0.0
@@ -53,7 +53,7 @@ ADDED = ("centre_u_px", "centre_v_px", "focal_share", "tilt_x_rad", "tilt_y_rad"
 
 
 def exact(true: CameraParameters) -> Calibration:
-    """The calibration that knows the camera as it is."""
+    """The calibration with the camera's true parameters."""
     return Calibration(camera=true)
 
 
@@ -89,7 +89,7 @@ def drawn_1997(
     tilt_rad: float = TILT_RAD,
     worst_m: float = WORST_M,
 ) -> Calibration:
-    """A calibration that is wrong by `worst_m` at the worst place; by what the sizes give, if that is 0.
+    """A calibration with an error of `worst_m` at the worst place; 0: with the error that follows from the sizes.
 
     Takes three draws of the stream: two directions and a sign, uniform.
     """
@@ -106,7 +106,7 @@ def drawn_1997(
 
 
 def _factor(true: CameraParameters, errors: CalibrationErrors, worst_m: float) -> float:
-    """What errors are to be multiplied by to have this worst case: nearly proportional, so a few steps do."""
+    """Factor on `errors` that gives this worst case: nearly proportional, so a few steps suffice."""
     grid = _grid(true)
     factor = 1.0
     for _ in range(_STEPS):

@@ -1,4 +1,4 @@
-"""Where a camera hangs, where it looks and how it draws: the numbers that a calibration finds.
+"""The parameters of a camera that a calibration finds: position, orientation and projection.
 
     image, 320 x 240            world: the paper's axes, z up from the floor
     o---> u (right)                  y

@@ -1,4 +1,4 @@
-"""Which colours the tracker knows, as the camera shows them: samples, classes, and the table from a pixel to its class.
+"""The tracker's colour classes: samples, classes, and the table from a pixel to its class.
 
 Samples are pixels read off pictures, in a CSV file:
 
@@ -50,7 +50,10 @@ def read_samples(path: str | Path) -> Samples:
 
 
 def parse_samples(text: str, origin: str) -> Samples:
-    """Colour samples from CSV text. Raises EyeError with the line for wrong columns and for what is no level."""
+    """Colour samples from CSV text.
+
+    Raises EyeError with the line for wrong columns and for a value that is no level.
+    """
     samples: Samples = {}
     for line, cells in csv_rows(text, origin, RGB, YCC):
         name = cells.pop("colour").strip()
@@ -91,9 +94,9 @@ class ColourMean(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_onl
 
 
 class ColourClasses(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_only=True, dict=True):
-    """The classes of some or all of `patterns.COLOURS`, by name, and what the floor looks like, if that is known.
+    """The classes of some or all of `patterns.COLOURS`, by name, and the floor's colour, if known.
 
-    Raises ValueError for colours that cannot be told apart.
+    Raises ValueError for colours that cannot be distinguished.
     """
 
     colours: dict[str, ColourMean]
@@ -107,7 +110,7 @@ class ColourClasses(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_
             raise ValueError(f"{problem[0]}: {problem[1]}; {problem[2]}")
 
     def text(self) -> str:
-        """As TOML, which `eye_file.read` takes."""
+        """The classes as TOML for `eye_file.read`."""
         return text(self)
 
     def chroma(self, name: str) -> tuple[int, int]:
@@ -130,7 +133,9 @@ class ColourClasses(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_
         return bytes(table)
 
     def _by_chroma(self) -> bytearray:
-        """Class by Cb >> 2, Cr >> 2 of what is light enough: that of the nearest hue, 0 for too little of it."""
+        """Table from (Cb >> 2, Cr >> 2) of a bright enough pixel to its class: that of the nearest hue, 0 for too
+        little chroma.
+        """
         middles = [64.0 * cell - 2016.0 for cell in range(64)]  # in 1/16 level around grey
         numbers, nearest = bytearray(4096), [0.0] * 4096
         for name, mean in self.colours.items():
@@ -183,7 +188,7 @@ def _sixteenths(x: float) -> int:
 
 
 def _problem(means: Mapping[str, ColourMean], floor: ColourMean | None) -> tuple[str, str, str] | None:
-    """Place, what and remedy of the first colour that cannot be told apart."""
+    """Place, reason and remedy for the first colour that cannot be distinguished."""
     if not means:
         return "colours", "there is no colour", "sample the team's colour and the identities'"
     names = list(means)

@@ -70,7 +70,7 @@ def parse(text: str, kind: type[T], origin: str) -> T:
 
 
 def text(struct: msgspec.Struct) -> str:
-    """The struct as TOML text that `parse` reads back as the same struct. What is None is left out."""
+    """The struct as TOML text that `parse` reads back as the same struct. None values are left out."""
     import tomli_w  # only who writes a file needs it
 
     return tomli_w.dumps(without_none(msgspec.to_builtins(struct)))

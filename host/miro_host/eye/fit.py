@@ -1,13 +1,13 @@
 """A calibration from control points: points whose places on the pitch and in the picture are known.
 
-Which parameters are found depends on what the points can tell:
+The parameters that can be found depend on the points:
 
     all points at one height     x_m, y_m, focal_px, pixel_aspect, tilt_x_rad, tilt_y_rad, turn_rad, k1
     2 cm or more between them    the same, height_m, centre_u_px, centre_v_px
 
 Points in one plane cannot tell a high camera with a long lens from a low one with a short lens, nor a tilt from a
-shifted centre, except by little more than noise: height and centre keep the values of the start. What the others then
-say holds in that plane, and nearly so at other heights, as far as the height is right.
+shifted centre, except by little more than noise: height and centre keep the values of the start. The other parameters
+are then right in that plane, and nearly right at other heights if the height is right.
 
 The method is Gauss and Newton's, damped (Levenberg 1944, Marquardt 1963): plain float64 in a written order.
 """
@@ -33,13 +33,13 @@ IN_SPACE = (*IN_PLANE, "height_m", "centre_u_px", "centre_v_px")
 SCALES = {"focal_px": 100.0, "centre_u_px": 100.0, "centre_v_px": 100.0}
 """Size of a parameter where it is not about 1."""
 PLANE_M = 0.02
-"""Points whose heights differ by less lie in one plane."""
+"""Points whose heights differ by less than this, in metres, count as one plane."""
 LINE_M = 0.05
 """Points must spread by more than this (rms) across their main direction."""
 MOST_POINTS = 5000
-"""More take minutes and tell no more."""
+"""Largest number of points: more take minutes and improve nothing."""
 MOST = 1e5
-"""No cell is larger: neither cm nor px."""
+"""Largest value of a cell, in cm or px."""
 WORST_RMS_PX = 10.0
 """A worse fit is no fit: columns exchanged, or a start that is far off."""
 
@@ -60,7 +60,7 @@ def read_points(path: str | Path) -> list[ControlPoint]:
 
 
 def parse_points(text: str, origin: str) -> list[ControlPoint]:
-    """The points in CSV text. Raises EyeError with the line for wrong columns and for what is no number."""
+    """The points in CSV text. Raises EyeError with the line for wrong columns and for a cell that is no number."""
     return [_point(cells, origin, line) for line, cells in csv_rows(text, origin, COLUMNS)]
 
 

@@ -53,7 +53,7 @@ class Grabber:
         return f"Grabber(robots={self.robots}, delay_frames={self.delay_frames}, {self.under_way!r})"
 
     def take(self, frame: Sightings | None) -> Sightings:
-        """Takes what was seen in a new frame and gives what arrives now; None: the frame before comes once more.
+        """Takes the sightings in a new frame and returns those that arrive now; None: the previous frame is repeated.
 
         The first `delay_frames` answers are frames in which no robot was found.
         """
@@ -63,6 +63,6 @@ class Grabber:
         return tuple(under_way[: self.robots])
 
     def after_load(self) -> None:
-        """Raises ValueError unless as many frames are under way as the delay says."""
+        """Raises ValueError unless as many frames are under way as the delay requires."""
         if len(self.under_way) != self.robots * (self.delay_frames + 1):
             raise ValueError(f"{len(self.under_way)} sightings are under way of {self.robots} robots")

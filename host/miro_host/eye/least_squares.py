@@ -13,14 +13,14 @@ STEPS = 100
 FLAT = 1e-12
 """A step that gains less, as a share of the sum of squares, is the last."""
 SMALL = 1e-10
-"""A step shorter than this (root mean square over parameters of size 1) is the end."""
+"""A step shorter than this (root mean square over parameters of size 1) ends the iteration."""
 _DIFFERENCE = 1e-6
 
 Residuals = Callable[[list[float]], list[float]]
 
 
 class NoConvergenceError(Exception):
-    """The steps did not end in a minimum."""
+    """The iteration did not reach a minimum."""
 
 
 def minimised(residuals: Residuals, first: Sequence[float]) -> list[float]:

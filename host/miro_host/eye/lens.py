@@ -17,7 +17,7 @@ _STEPS = 6
 
 
 class Lens:
-    """A camera as geometry. Constant: nothing of it is state."""
+    """The geometry of a camera. It is constant and no part of the state."""
 
     NOT_STATE = ("*",)
 
@@ -43,7 +43,7 @@ class Lens:
     def slopes(self, u: float, v: float) -> None:
         """Leaves the slopes of the ray through (u, v) in `out_x`, `out_y`.
 
-        Raises ValueError for a ray that does not fall, and for a pixel beyond what the lens can draw.
+        Raises ValueError for a ray that does not go down, and for a pixel outside of the lens's range.
         """
         right = (u - self.centre_u) / self.focal_u
         up = (self.centre_v - v) / self.focal_v
@@ -68,7 +68,10 @@ class Lens:
         self.out_y = (self.ya * right + self.yb * up - self.yc) / fall
 
     def ground(self, u: float, v: float, z_m: float) -> tuple[float, float]:
-        """(x_m, y_m) of what is drawn at (u, v) and lies `z_m` above the floor. Raises ValueError as `slopes` does."""
+        """(x_m, y_m) of a point that is drawn at (u, v) and is `z_m` above the floor.
+
+        Raises ValueError as `slopes` does.
+        """
         self.slopes(u, v)
         fall_m = self.height_m - z_m
         return self.x_m + fall_m * self.out_x, self.y_m + fall_m * self.out_y

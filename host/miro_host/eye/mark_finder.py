@@ -1,4 +1,4 @@
-"""Where a picture shows a mark: pixels across a bright band in, its distance from where it was expected out.
+"""Finds a mark in a picture: reads pixels across a bright band and returns its distance from the expected place.
 
       light                 +--+            The light of a row is read outwards from its brightest pixel to the first
         |               +--+|  |            valley on either side; what is above the valley's level belongs to the band.
@@ -19,11 +19,11 @@ from miro_host.eye.lens import Lens
 from miro_host.eye.pitch_marks import PitchMark
 
 REACH_PX = 11
-"""How far from the expected place a band may be."""
+"""Largest distance of a band from the expected place, in pixels."""
 ROWS = 5
 """Rows (or columns) that are read."""
 HALF_BAND_PX = 5
-"""No band is wider than twice this: so far the valleys are looked for."""
+"""Half of the largest width of a band, in pixels; valleys are searched within this distance."""
 LEAST_RISE = 0.5
 """Share of the brightest light by which a band is above both valleys."""
 LEAST_LEVEL = 60
@@ -42,7 +42,10 @@ class FloorMark(NamedTuple):
 
 
 def expected(lens: Lens, mark: PitchMark) -> FloorMark:
-    """Where a camera draws a mark: half-way between foot and edge of a wall. Raises ValueError as `Lens.pixel` does."""
+    """The place of a mark in the picture: half-way between foot and edge of a wall.
+
+    Raises ValueError as `Lens.pixel` does.
+    """
     u, v = _middle(lens, mark, 0.0)
     ahead_u, ahead_v = _middle(lens, mark, _STEP_M)
     along_u, along_v = ahead_u - u, ahead_v - v
@@ -60,7 +63,7 @@ def _middle(lens: Lens, mark: PitchMark, ahead_m: float) -> tuple[float, float]:
 
 
 def find(frame: Pixels, band: FloorMark) -> float | None:
-    """How far across the band is from where it was expected, in pixels. None: it is not there, or not for sure."""
+    """Distance of the band from its expected place, across it, in pixels. None: it is missing or uncertain."""
     by_rows = abs(band.across_u) >= abs(band.across_v)
     length = 2 * REACH_PX + 1
     width, height = (length, ROWS) if by_rows else (ROWS, length)

@@ -25,8 +25,8 @@ class Patches:
     """Reads windows. `look` finds the patches, `choose` the pair; results stay in the fields `out_`.
 
     `out_pairs`: pairs at the pattern's distance. `out_team`, `out_identity`: regions of the nearest. `out_off_m`: its
-    distance from what is expected, `out_next_m`: that of the second. `out_contested`: see above. `out_gap_m`: distance
-    of its two patches.
+    distance from the expected place, `out_next_m`: that of the second. `out_contested`: see above. `out_gap_m`:
+    distance of its two patches.
     """
 
     NOT_STATE = ("*",)
@@ -94,7 +94,7 @@ class Patches:
             self.expected += 1
 
     def choose(self, team: int, identity: int) -> int:
-        """The pair of these two classes that is nearest to what is expected; returns the number of pairs."""
+        """Chooses the pair of these two classes nearest to the expected place; returns the number of pairs."""
         self.out_pairs = 0
         self.out_off_m = self.out_next_m = _FAR
         for mark in range(self.count):
@@ -117,7 +117,7 @@ class Patches:
         return least_m * least_m <= dx * dx + dy * dy <= most_m * most_m
 
     def take(self, mark: int, other: int) -> None:
-        """A pair was found: it is the nearest so far, or it may be the second."""
+        """Takes a found pair as the nearest so far, or as the second."""
         self.out_pairs += 1
         off = self.off_m(mark, other)
         if off >= self.out_off_m:
@@ -133,7 +133,7 @@ class Patches:
         self.out_contested = self.partners(mark) > 1 or self.partners(other) > 1
 
     def off_m(self, team: int, identity: int) -> float:
-        """Distance of a pair from what is expected; 0 if nothing is."""
+        """Distance of a pair from the expected place, in metres; 0 if there is none."""
         if self.expected == 0:
             return 0.0
         least = _FAR

@@ -1,4 +1,4 @@
-"""What a robot wears on its top: patches of colour, from which the tracker reads who and where it is.
+"""The patches of colour on a robot's top, from which the tracker finds its identity and posture.
 
 Robot axes: x ahead, y left, origin in the middle of its top, a square of 75 mm. The middle between team patch and
 identity patch is the robot's centre. FIRA's rules ask for a team patch of at least 35 x 35 mm, yellow or blue, and

@@ -1,4 +1,4 @@
-"""What a PC knows of the pitch: places of lines and walls that a camera sees as a bright band on dark ground.
+"""The pitch in the PC's memory: places of lines and walls that a camera shows as a bright band on dark ground.
 
         +--|--|--|--|--|--|--|--|--|--|--|--|--+
         _                  |                   _      | and _  a mark: the picture is read across the band there

@@ -4,15 +4,15 @@ doi 10.5772/7341).
     picture -> a mark, where the parameters of now draw it -> distance across the band -> Kalman update of 7 numbers
     every `TOLD_FRAMES` frames: parameters -> calibration of the tracker
 
-Learnt are the five numbers in which a calibration of 1997 may be wrong (middle of the picture, focal length, tilts),
-turn and distortion. The place of the camera and its height are taken as told. A line on the floor and a wall's face
-say how the camera draws the floor and 2.5 cm above it; the robots' tops at 7.5 cm follow from the parameters. The
-encoders of the robots never see where the pitch lies in the picture, so they cannot replace a line
+It learns the five numbers in which a calibration of 1997 may be wrong (middle of the picture, focal length, tilts),
+turn and distortion. Position and height of the camera are taken from the first calibration. A line on the floor and a
+wall's face show the projection of the floor and of 2.5 cm above it; the robots' tops at 7.5 cm follow from the
+parameters. The encoders of the robots never see where the pitch lies in the picture, so they cannot replace a line
 (`benchmarks/observability.py` calculates it).
 
-A mark is scalar: it tells what is across its band. The estimate is linear about the calibration that was told at the
-beginning, whose derivative is kept; the expected place itself is drawn with the parameters of now. A mark is left out
-where a robot of the own team is near; it is refused where it is further off than `GATE` standard deviations.
+A mark is scalar: it measures across its band only. The estimate is linear about the first calibration, whose derivative
+is stored; the expected place itself is computed with the present parameters. A mark is left out where a robot of the
+own team is near; it is refused where it is further off than `GATE` standard deviations.
 """
 
 from __future__ import annotations
@@ -35,7 +35,7 @@ from miro_host.eye.track import Track
 
 LEARNT = ("centre_u_px", "centre_v_px", "focal_px", "tilt_x_rad", "tilt_y_rad", "turn_rad", "k1")
 SPREADS = (3.0, 3.0, 15.0, 0.03, 0.03, 0.02, 0.1)
-"""Standard deviations at the beginning, in the units of `LEARNT`: the first five are three times what spoils 1997."""
+"""Standard deviations at the beginning, in the units of `LEARNT`: the first five are three times the errors of 1997."""
 WALL_NOISE_PX = 0.08
 LINE_NOISE_PX = 0.25
 """Standard deviations: a line is thinner than a pixel, and up to 0.3 px off, always the same way."""
@@ -43,7 +43,7 @@ GATE = 4.0
 STRIDE = 29
 """From one mark to the next: prime to their number, so that marks all over the picture follow each other."""
 SETTLED_FRAMES = 150
-"""So long a mark is looked at in every frame; from then on in one of `SELDOM`."""
+"""Frames in which every mark is examined; later only in one frame of `SELDOM`."""
 SELDOM = 8
 TOLD_FRAMES = 15
 NEAR_M = 0.15
@@ -53,7 +53,7 @@ _SIZE = len(LEARNT)
 
 
 class SelfCalibration:
-    """The changes of `LEARNT` against the calibration that was told, their covariance (row by row), and counts.
+    """The changes of `LEARNT` against the first calibration, their covariance (row by row), and counts.
 
     `looked`: frames; `used`, `refused`: marks; `told`: the changes that the tracker uses.
     """
@@ -96,7 +96,7 @@ class SelfCalibration:
 
     @property
     def calibration(self) -> Calibration:
-        """What the tracker is told."""
+        """The calibration used by the tracker."""
         return msgspec.structs.replace(self.begun, camera=changed(self.begun.camera, self.told))
 
     def spreads(self) -> dict[str, float]:

@@ -66,12 +66,12 @@ class Top:
         )
 
     def confidence(self, gap_m: float, team_area: int, identity_area: int) -> float:
-        """How far a pair is from the nearest bound of what is taken for a robot: 1 in the middle, 0 on it."""
+        """Distance of a pair from the nearest limit for a robot: 1 in the middle, 0 at the limit."""
         least = 1.0 - abs(gap_m - self.distance_m) / (_DISTANCE * self.distance_m)
         return max(0.0, min(least, self.margin(team_area), self.margin(identity_area)))
 
     def margin(self, area: int) -> float:
-        """How far the area of one patch is from the nearest bound: 1 at what is expected, 0 on the bound."""
+        """Distance of a patch's area from the nearest limit: 1 at the expected area, 0 at the limit."""
         share = area / self.area_px
         if share < 1.0:
             return (share - _LEAST) / (1.0 - _LEAST)

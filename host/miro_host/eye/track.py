@@ -1,4 +1,4 @@
-"""What the tracker knows of one robot: its last two sightings, and where they say that it will be."""
+"""The tracker's data about one robot: its last two sightings, and the predicted place."""
 
 from __future__ import annotations
 
@@ -10,13 +10,13 @@ from miro_exact.state import TICK
 from miro_host.posture import Posture
 
 MOST_SPEED_M_S = 2.0
-"""No robot goes faster; its patches do not either when it also turns."""
+"""Largest speed of a robot and its patches, in m/s, also while it turns."""
 REACH_M = 0.010
-"""Added to what a robot can go since it was seen: errors of measurement."""
+"""Added to the distance that a robot can go since its last sighting, for errors of measurement, in metres."""
 LONGEST_GAP_S = 0.2
-"""Two sightings further apart tell no velocity."""
+"""Sightings further apart than this, in seconds, give no velocity."""
 LONGEST_AHEAD_S = 0.1
-"""A prediction goes on no longer than this: a robot that is lost has often hit something."""
+"""Longest prediction, in seconds: a lost robot has often hit something."""
 
 _PLACE = ("d", -100.0, 100.0)
 _HEADING = ("d", -3.2, 3.2)
@@ -82,7 +82,7 @@ class Track:
         return (tick - self.tick) / TICKS_PER_SECOND
 
     def reach_m(self, tick: int) -> float:
-        """How far from its last sighting it may be seen at a tick."""
+        """Largest distance from its last sighting at which it is searched at a tick, in metres."""
         return MOST_SPEED_M_S * self.unseen_s(tick) + REACH_M
 
     def predicted(self, tick: int) -> tuple[float, float, float]:

@@ -37,7 +37,7 @@ LARGE_PX = 64
 SEARCH_PX = 56
 """Side of a window around a team patch: its identity patch lies inside, wherever it is."""
 CLEARLY_M = 0.010
-"""The second pair must be so much further from the expected posture."""
+"""The second pair must be further from the expected posture by this much, in metres."""
 CONTESTED_M = 0.025
 """A pair whose patches could be others' must be so near: a wrong one of two touching robots is 53 mm off."""
 
@@ -64,7 +64,7 @@ class Window(NamedTuple):
 
 
 class Notes:
-    """What a tracker did with its last picture, for a person to look at; no state, and nothing is found otherwise.
+    """The tracker's working on its last picture, for display only: it is no state and does not affect tracking.
 
     `tick`: of its exposure, -1 before the first. `pairs`: by slot, None: lost.
     """
@@ -146,7 +146,7 @@ class Tracker:
             self._believe(self.learning.calibration)
 
     def track(self, frame: Pixels, tick: int) -> list[Sighting | None]:
-        """Where the robots are in a picture exposed at `tick`, in their order; None: not found, or not for sure."""
+        """The robots' postures in a picture exposed at `tick`, in their order; None: not found, or uncertain."""
         if self.notes is not None:
             self.notes.begin(tick)
         pairs = [self._followed(frame, tick, slot) for slot in range(len(self.tracks))]
@@ -242,7 +242,7 @@ class Tracker:
         return self._pair(pixels, tick, slot)
 
     def _part(self, pairs: list[Pair | None]) -> None:
-        """Where two robots use one team patch, the one further from what was expected is lost."""
+        """If two robots use one team patch, the one further from its expected place is marked lost."""
         for slot in range(1, len(pairs)):
             for other in range(slot):
                 pair, rival = pairs[slot], pairs[other]
@@ -320,7 +320,7 @@ def candidates(frame: Pixels, regions: Regions, team: int, side_px: float) -> li
 
 
 def _add(squares: list[tuple[float, int, int]], u: float, row: int, side_px: float) -> None:
-    """A run goes on with what was found in the last rows, or it is something new."""
+    """Extends a square found in the last rows by a run, or begins a new one."""
     for place, (first_u, first, last) in enumerate(squares):
         if row - last <= ROW_STEP and row - first <= 2.0 * side_px and abs(u - first_u) <= side_px:
             squares[place] = (first_u, first, row)

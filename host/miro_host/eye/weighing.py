@@ -67,7 +67,7 @@ class Weighing:
         return f"Weighing(gains and least={gains})"
 
     def weight(self, which: int, cb: int, cr: int) -> int:
-        """What a pixel's share of the team (0) or the identity (1) has more than the floor's, in 1/256."""
+        """A pixel's share of the team (0) or identity (1) colour beyond the floor's share, in 1/256."""
         share = (self.gain_cb[which] * (cb - 128) + self.gain_cr[which] * (cr - 128)) >> _SHIFT
         return max(0, min(share - self.least[which], _MOST))
 

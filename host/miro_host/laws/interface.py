@@ -1,4 +1,4 @@
-"""What a tracking law is given, what it answers, and what it must declare about itself.
+"""The interface of tracking laws: input, output, and declarations.
 
 A law is two classes. The parameters are a frozen struct whose tag is the law's name; they are the scenario's
 `controller` table, and their `law` method makes the law. The law itself has a `step`, which is called once in each
@@ -30,10 +30,10 @@ from miro_host.telemetry_receiver import LastTelemetry
 
 
 class LawInput(msgspec.Struct, frozen=True, gc=False):
-    """What a law is given in one control period.
+    """The input of a law in one control period.
 
     `t_s` is the time since the start of the reference at which `reference` was evaluated; `path` gives the reference at
-    any other time. `posture` is what the estimator made of the camera's measurements. `v_m_s`, `w_rad_s` are the
+    any other time. `posture` is the estimator's result from the camera's measurements. `v_m_s`, `w_rad_s` are the
     commanded velocities that the last period ended with. `telemetry` is the robot's last answer by radio, None before
     the first.
     """
@@ -102,14 +102,14 @@ class Law(Remembering, Generic[P]):
     parameters: P
 
     def step(self, given: LawInput) -> Answer:
-        """One control period. Called in the order of time; a period without a posture is left out."""
+        """Runs one control period. Called in the order of time; not called for a period without a posture."""
         raise NotImplementedError(f"{type(self).__name__} has no method `step`")
 
 
 class Errors(msgspec.Struct, frozen=True, gc=False):
-    """Where the reference is, seen from the robot, as Kanayama et al. (ICRA 1990) define it.
+    """The reference's posture in the robot's axes, as defined by Kanayama et al. (ICRA 1990).
 
-    x ahead, y to the left, theta anticlockwise in (-pi, pi]. They do not depend on where the origin of the world is.
+    x ahead, y to the left, theta anticlockwise in (-pi, pi]. They do not depend on the world's origin.
     """
 
     x_m: float

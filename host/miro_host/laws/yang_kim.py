@@ -122,7 +122,7 @@ class YangKim(Law[Gains]):
 
 
 class YangKimControl:
-    """What the law saw and what it answers, with one set of gains.
+    """Errors and output of the law, with one set of gains.
 
     Errors c - r in polar coordinates (m, rad, wrapped), surfaces s1 [m/s], s2 [rad/s] of equation (13),
     inputs u1 [m/s2], u2 [rad/s2] of equation (16).

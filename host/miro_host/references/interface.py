@@ -1,4 +1,4 @@
-"""What a reference trajectory gives and what its parameters must have.
+"""The interface of reference trajectories and their parameters.
 
 A reference is two classes, like a law: a frozen struct of parameters whose tag is the reference's name, which is the
 scenario's `reference` table, and the trajectory that it makes, a function of time without memory.
@@ -51,10 +51,10 @@ class Trajectory(Protocol):
 
 
 class SamplingPace(msgspec.Struct, frozen=True):
-    """How closely, and how long, one has to look at a trajectory to have seen all of it.
+    """The sampling interval and duration that cover a whole trajectory.
 
-    Within `step_s` it goes no further and turns no more than was asked. After `until_s` it stands, or goes only where
-    it has been. After `steady_s` its speeds and accelerations are such as they have been.
+    Within `step_s` it goes and turns no more than requested. After `until_s` it stands or repeats its path. After
+    `steady_s` its speeds and accelerations repeat.
     """
 
     step_s: float
@@ -64,7 +64,7 @@ class SamplingPace(msgspec.Struct, frozen=True):
 
 @runtime_checkable
 class Paced(Trajectory, Protocol):
-    """A trajectory that says how closely it has to be looked at. All of our own do."""
+    """A trajectory with a sampling pace. All of our own have one."""
 
     def pace(self, step_m: float, step_rad: float) -> SamplingPace:
         """Its pace for steps of `step_m` and `step_rad` at most."""

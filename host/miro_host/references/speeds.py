@@ -1,4 +1,4 @@
-"""How fast a path is driven: the greatest speed within its limits, by one pass forwards and one backwards.
+"""The speed along a path: the greatest within its limits, by one pass forwards and one backwards.
 
 The path is cut into cells. Within a cell the acceleration along the path is constant, so the square of the speed is
 linear in the way: z' = 2 a ds. A pass forwards keeps z from growing faster than the acceleration allows, one backwards

@@ -114,12 +114,14 @@ class Timed:
 
 
 def _rests(points: Sequence[Point]) -> list[bool]:
-    """Of each piece, whether it stands."""
+    """For each piece: True if it stands still."""
     return [a[1:] == b[1:] for a, b in pairwise(points)]
 
 
 def _headings(points: Sequence[Point]) -> list[float]:
-    """Of each piece, the direction from its first point to its last; of one that stands, that of the one before."""
+    """For each piece: the direction from its first point to its last; a standing piece has the direction of the one
+    before.
+    """
     known: list[float | None] = [
         None if rests else atan2(b[2] - a[2], b[1] - a[1])
         for (a, b), rests in zip(pairwise(points), _rests(points), strict=True)

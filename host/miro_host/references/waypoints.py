@@ -132,7 +132,7 @@ class Waypoints:
         return tau
 
     def pace(self, step_m: float, step_rad: float) -> SamplingPace:
-        """It has been everywhere after its end, or after the first lap at its own speed."""
+        """The pace of a path that is complete at its end, or after the first lap at its full speed."""
         until_s = self.start.duration_s
         if self.closed:
             until_s += self.lap.duration_s

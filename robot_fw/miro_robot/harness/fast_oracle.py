@@ -1,4 +1,4 @@
-"""What a MIRO must do with what its serial port received, judged from the event log while it runs.
+"""Judges a MIRO's reaction to the characters it received, from the event log while it runs.
 
 A crash counts once the check of the same name fails for it in a world (`mirotwin.verify.checks`). Both judge by the
 same rules, `miro_protocol.robot_rules`; this oracle takes the frames that the robot received for those that the host
@@ -57,14 +57,14 @@ NAMES = (
 )
 """The checks, by `code`."""
 EDGE_TICKS = TICKS_PER_MS // 5
-"""Firmware tells 150 ms to within 0.1 ms: what it makes of a frame so near to that, nobody can say."""
+"""Within this distance of 150 ms a frame may be fresh or not: firmware measures the time to within 0.1 ms."""
 
 _NO_FAULT, _LM629, _MOVES, _ACCEPTS, _ACTS, _STOPS, _OFF, _IN_TURN, _ANSWERS = range(1, 10)
 _TEAM, _ASK = FrameType.TEAM, FrameType.TEAM_ASK
 
 
 class FastOracle(LiveOracle):
-    """Of robot `slot` of `robots`, whose board is `board`. `accepted`: fresh frames of the run; `pc`: of a fault."""
+    """The oracle of robot `slot` of `robots`, on `board`. `accepted`: fresh frames of the run; `pc`: of a fault."""
 
     NOT_STATE: tuple[str, ...] = ("*",)
 
@@ -103,7 +103,7 @@ class FastOracle(LiveOracle):
         self.origin.frames.clear()
 
     def _forget(self) -> None:
-        """The processor begins again: nothing was received or told."""
+        """Resets the memory when the processor restarts: nothing received, nothing ordered."""
         self.window.begin()
         self.telemetry.begin()
         self.freshness.last_seq = None
@@ -117,7 +117,9 @@ class FastOracle(LiveOracle):
         self.off.last_tick = -1
 
     def restarted(self, tick: int) -> None:
-        """Pins that all went high at once may have told an LM629 nonsense, until firmware has reset it."""
+        """Handles a restart: pins that all went high at once may have sent nonsense to an LM629, until firmware resets
+        it.
+        """
         self.up_tick = tick + ACTING_TICKS
         self.look(tick)
         self._forget()
@@ -160,7 +162,7 @@ class FastOracle(LiveOracle):
             self.tick = tick
 
     def _pass(self, tick: int) -> None:
-        """What had to have happened before `tick`."""
+        """Checks what must have happened before `tick`."""
         if self.told_tick >= 0 and tick > self.told_tick:
             if not self.origin.allows(self.told_tick, self.left_order.word(), self.right_order.word()):
                 self._found(_ACCEPTS, self.told_tick)
@@ -221,14 +223,14 @@ class FastOracle(LiveOracle):
                 self.decided = 0
 
     def _stops_already(self) -> bool:
-        """True if velocity 0 is wanted, and both wheels are told so with their loops closed."""
+        """True if velocity 0 is required and both wheels are ordered to it with their loops closed."""
         if self.left_order.what == "off" or self.right_order.what == "off":
             return False
         told = self.left_order.moves() or self.right_order.moves()
         return not told and self.left == 0 and self.right == 0
 
     def _read_pair(self) -> bool:
-        """What the team frame has for this robot; False if it is not to be acted on."""
+        """Reads this robot's velocities from the team frame; False if they must not be acted on."""
         if self.slot >= self.robots:
             return False
         for place in range(1, self.payload, 2):

@@ -27,13 +27,13 @@ from miro_robot.plant import Plant
 LEAD_TICKS = 1200
 """From the saved moment to the first start bit."""
 SETTLE_TICKS = 30 * TICKS_PER_SECOND // 1000
-"""How long after its last character firmware that sleeps may stay awake."""
+"""Longest time after its last character for which firmware that sleeps may stay awake."""
 AWAKE_TICKS = 10 * TICKS_PER_SECOND // 1000
-"""How long after the last character a run goes on where firmware never sleeps and nothing else is asked for."""
+"""Length of a run after the last character for firmware that never sleeps, unless another one is requested."""
 AHEAD_TICKS = 240  # an instruction and what looks ahead may overrun a stop by so much
 
 DONE, STOPPED, AWAKE = range(3)
-"""How a run ended: as it should, by a fault or the oracle, or without going to sleep."""
+"""Results of a run: done; stopped by a fault or the oracle; did not go to sleep."""
 
 _LEAD, _SETTLE, _AWAKE_TICKS, _AHEAD = LEAD_TICKS, SETTLE_TICKS, AWAKE_TICKS, AHEAD_TICKS
 _DONE, _STOPPED, _AWAKE = DONE, STOPPED, AWAKE
@@ -91,7 +91,10 @@ class Moment:
         self.highest_sp = 0
 
     def keep(self, tick: int, begun: int, edges: bytes) -> None:
-        """It is now. The way to it has the events of the log from `begun` on, and the edges counted in a map."""
+        """Stores the present state.
+
+        The way to it has the events of the log from `begun` on, and `edges`, the counted edges in a map.
+        """
         cpu = self.cpu
         self.tick = tick
         self.state = self.flat.save()

@@ -1,4 +1,4 @@
-"""The bytes of a fuzz input as what a robot hears: characters, pauses, bad stop bits, resets.
+"""Interprets a fuzz input as the input of a robot: characters, pauses, bad stop bits, resets.
 
     BYTES       each byte is a character; all follow each other without a pause
     FRAMES      HDR and payload of one frame after the other, sealed. Bits 7 and 6 of HDR are the type, bits 2 to 0 how
@@ -54,7 +54,7 @@ MOST_CHARACTERS = 2048
 MOST_PUTS = 256
 MOST_TICKS = 3 * TICKS_PER_SECOND
 RESET_TICKS = 48
-"""How long the reset pin is up: two machine cycles are enough, these are four (AT89C52 data sheet 0313H)."""
+"""Length of a reset pulse in ticks: two machine cycles are enough, these are four (AT89C52 data sheet 0313H)."""
 UP_TICKS = 5 * TICKS_PER_SECOND // 1000
 PUT_TICKS = 480
 """A put comes in the middle: 240 ticks after the last character, and before the next, which is known so long before."""
@@ -168,7 +168,9 @@ class Program:
         return self.characters[place], bool(flaws & _BAD_STOP), bool(flaws & _RESET), self.pauses[place]
 
     def put(self, number: int) -> tuple[int, int, int, int]:
-        """Of one of the puts: the character after it, ticks since the begin, which value, what."""
+        """Entry `number` of the puts: index of the character after it, ticks since the begin, index of the value,
+        value.
+        """
         if not 0 <= number < self.puts:
             raise IndexError(f"put {number} of {self.puts}")
         place, ticks = self.put_places[number], self.put_ticks[number]
@@ -186,7 +188,7 @@ class Program:
         return value
 
     def _put(self, value: int) -> None:
-        """One more character."""
+        """Appends one character."""
         if self._has_room():
             self.characters[self.count] = value
             self.flaws[self.count] = self._flags

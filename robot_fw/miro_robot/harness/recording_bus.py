@@ -11,7 +11,7 @@ from miro_robot.mcs51.uart import STOPPED_TICK
 from miro_robot.mcs51.xram import XramBus
 
 LONGEST_ANSWER_TICKS = 24_000_000
-"""How long a run goes on, behind the moment at which the firmware sleeps, while it still sends."""
+"""Longest continuation of a run, after the firmware has gone to sleep, while it still sends; in ticks."""
 _LONGEST = LONGEST_ANSWER_TICKS
 _KEPT = 4096  # characters of each direction
 _NO_FAULT = 1  # what a `BareOracle` finds

@@ -45,7 +45,7 @@ class CType(msgspec.Struct, frozen=True):
 
 
 class Member(msgspec.Struct, frozen=True):
-    """A member of a struct or union, so many bytes from its start."""
+    """A member of a struct or union, with its offset in bytes."""
 
     name: str
     offset: int
@@ -56,7 +56,7 @@ Fields = Mapping[str, tuple[Member, ...]]
 """The members of structs, by tag."""
 
 MOST_BYTES = 0x10000
-"""No variable is larger than a memory of the 8051."""
+"""Largest size of a variable: a memory of the 8051."""
 _MOST_DEEP = 8
 _FLOAT_BYTES = 4
 _ARRAY = re.compile(r"DA([0-9]{1,6})d")
@@ -98,8 +98,8 @@ def _type_of(chain: str, size: int, signed: bool) -> CType | None:
 
 
 def values_in(kind: CType, fields: Fields, inside: tuple[str, ...] = ()) -> int:
-    """How many numbers a type is made of. 0 for one that cannot be: a member that lies outside its struct, a struct
-    within itself, more than `MOST_BYTES` in all (of a union, members count that lie over each other).
+    """Number of values in a type. 0 for an impossible type: a member that lies outside its struct, a struct within
+    itself, more than `MOST_BYTES` in all (of a union, members count that lie over each other).
     """
     if kind.kind == "array" and kind.element is not None:
         count = kind.count * values_in(kind.element, fields, inside)
@@ -134,7 +134,7 @@ def type_named(name: str) -> CType | None:
 
 
 def value_of(kind: CType, data: bytes, fields: Fields) -> Any:
-    """What `data`, as many bytes as the type has, means."""
+    """The value of `data`, the bytes of a variable of this type."""
     if kind.kind == "array" and kind.element is not None:
         size = kind.element.size
         parts = [data[at * size : (at + 1) * size] for at in range(kind.count)]

@@ -107,10 +107,11 @@ class DebugInfo:
 
 
 class Sources:
-    """Where the compiler's file names are found: in `folders`, in this order, and nowhere else.
+    """Finds the compiler's source files in `folders`, in this order, and nowhere else.
 
-    A debug file may come from a stranger, and what it names may be shown in a page that is sent on. So only regular
-    files are found that lie in one of the folders, links resolved. A whole path of elsewhere is looked for by its name.
+    A debug file may come from an untrusted source, and the files it names may appear in a page that is sent on. So only
+    regular files inside these folders, with links resolved, are found. For an absolute path outside only the name is
+    searched.
     """
 
     def __init__(self, folders: Iterable[Path]) -> None:
@@ -126,7 +127,7 @@ class Sources:
         return self._found[file]
 
     def text(self, line: SourceLine) -> str:
-        """What stands in that line, "" if the file is not there or is shorter."""
+        """The text of that line; "" if the file is missing or shorter."""
         path = self.path(line.file)
         lines = [] if path is None else read_text(path).splitlines()
         return lines[line.line - 1].strip() if 0 < line.line <= len(lines) else ""

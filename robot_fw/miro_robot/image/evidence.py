@@ -104,7 +104,7 @@ def _check_functions(places: Sequence[CodePlace], code: bytes, loaded: bytes) ->
 
 
 def _runs_into(code: bytes, address: int) -> bool:
-    """True if none of the instructions that may end in front of `address` goes elsewhere."""
+    """True if none of the possible instructions before `address` jumps elsewhere."""
     return all(
         LENGTH[code[address - size]] != size or goes_on(code[address - size])
         for size in (1, 2, 3)

@@ -68,9 +68,9 @@ class Image(msgspec.Struct, frozen=True):
         return Image(self.path, bytes(code), used, self.size + other.size, sha256, names, content)
 
     def code_address(self, name: str, path: str | Path = "", place: str = "") -> int:
-        """Of a symbol of the code, with or without the underscore that C puts before it.
+        """Address of a code symbol, with or without the underscore that C puts before it.
 
-        Raises BadInput with the names that come close. `path`, `place`: who asked for it; default: the image.
+        Raises BadInput with similar names. `path`, `place`: source of the name, for errors; default: the image.
         """
         for known in (name, name.removeprefix("_")):
             symbol = self.symbols.find(known)
@@ -123,7 +123,7 @@ def parse_hex(
 
 @lru_cache(32)  # by content: a test loads the robot's image hundreds of times
 def _parsed(content: bytes, limit: int) -> tuple[Image, bytes]:
-    """What a file's content alone says; and 1 for each address that it has a byte for."""
+    """The image from a file's content alone, and 1 for each address with a byte in it."""
     records = _as_bytes(content)
     if not records.strip(_BLANK):
         raise ImageError("", 0, "is empty", _REBUILD)

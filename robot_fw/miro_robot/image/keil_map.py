@@ -1,4 +1,4 @@
-"""What Keil's linkers write beside an image: BL51's `.M51` and LX51's `.MAP`, read in one pass.
+"""Parses the map files of Keil's linkers: BL51's `.M51` and LX51's `.MAP`, in one pass.
 
     LINK MAP / MEMORY MAP      segments: `?PR?NAME?MODULE` is the code of a C function, `?CO?MODULE` constants, `?STACK`
                                the stack, `_DATA_GROUP_` the locals that functions share
@@ -223,7 +223,7 @@ class _Reader:
     def function_in(
         self, number: int, segment: KeilSegment, code: list[tuple[int, str]]
     ) -> tuple[CodePlace, int] | None:
-        """Where the function of a segment begins and ends; None for code of the assembler, which has labels.
+        """First and last address of a segment's function; None for assembler code, which has labels.
 
         Its name is written there in capitals. The optimizer may put code (`L?0038`) in front of it.
         """

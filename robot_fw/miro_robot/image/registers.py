@@ -1,7 +1,7 @@
-"""Local variables that the compiler keeps in registers, and which block of C an instruction belongs to.
+"""Local variables in registers, and the C block of an instruction.
 
-The debug file tells for each one the block it is declared in, not where it lives: within its block a register may hold
-something else already, and one without registers was optimised away.
+The debug file contains the block of declaration of each variable, not the range in which it is live: within its block a
+register may hold something else already, and one without registers was optimised away.
 """
 
 from __future__ import annotations
@@ -41,8 +41,9 @@ class LocalVariable(msgspec.Struct, frozen=True):
 
 
 class Blocks(msgspec.Struct, frozen=True, eq=False):
-    """Of one debug file. `places`: (address, level, block) where the code of a block begins or goes on, by address.
-    `banks`: of a function's registers, by its name and its module, which is "" where it is not static.
+    """The blocks of one debug file. `places`: (address, level, block) at which the code of a block begins or continues,
+    sorted by address. `banks`: (name, module) of a function -> its register bank; module is "" for a function that is
+    not static.
     """
 
     variables: tuple[LocalVariable, ...]
@@ -54,20 +55,22 @@ class Blocks(msgspec.Struct, frozen=True, eq=False):
         return self.banks.get((name, module), self.banks.get((name, ""), 0))
 
     def of_function(self, name: str, module: str) -> list[LocalVariable]:
-        """Those of a function; `module` tells static functions of the same name apart."""
+        """Local variables of a function; `module` distinguishes static functions of the same name."""
         own = [variable for variable in self.variables if variable.function == name]
         alike = len({variable.module for variable in own}) < 2
         return own if alike else [variable for variable in own if variable.module == module]
 
     def parameters(self, own: list[LocalVariable], first: int, end: int) -> list[LocalVariable]:
-        """Those of `own` that are parameters of a function: their block is the one before its body's."""
+        """The parameters among `own` of a function: their block is the one before its body's."""
         begin, after = (bisect.bisect_left(self.places, (address, 0, 0)) for address in (first, end))
         bodies = [(address, block) for address, level, block in self.places[begin:after] if level <= 1]
         _, body = min(bodies, default=(0, 0))  # of a function of one line, only its end is recorded
         return [variable for variable in own if variable.level <= 1 and variable.block < body]
 
     def visible(self, own: list[LocalVariable], first: int, address: int) -> list[LocalVariable]:
-        """Those of `own`, in registers or on the stack, that the C of an instruction could name; inner ones first."""
+        """The variables among `own`, in registers or on the stack, that are in scope at an instruction; inner ones
+        first.
+        """
         around = self._around(first, address)
         seen = [variable for variable in own if variable.level <= 1 or variable.block in around]
         return sorted(

@@ -1,8 +1,8 @@
-"""Where the start-up code of an image puts the stack: `MOV SP,#data` on the way from the reset vector.
+"""Finds the stack's first address in an image's start-up code: `MOV SP,#data` on the way from the reset vector.
 
 Jumps are followed, loops are left, calls return: start-up code clears RAM and sets SP before it calls anything that
-uses the stack. Where an image writes SP in another way, too, it may have several stacks (tasks, frames), and nothing
-is concluded.
+uses the stack. If an image also writes SP in another way, it may have several stacks (tasks, frames), and no address is
+returned.
 """
 
 from __future__ import annotations

@@ -1,8 +1,8 @@
-"""What SDCC writes beside an image: its `.map`, `.cdb` and `.rst` files, each read in one pass, and the names in them.
+"""Parses SDCC's files beside an image: `.map`, `.cdb` and `.rst`, each in one pass, and looks up names in them.
 
-What was read is kept by content: a file that is read again within the process, for another image or another world, is
-not parsed again. Lines count from 1, as `str.splitlines` has them. The files are read with the first look-up of a name:
-most programs that load an image look up none.
+Parsed files are cached by content, so a file is parsed only once in a process, also for another image or world. Lines
+count from 1, as `str.splitlines` has them. The files are read with the first look-up of a name: most programs that load
+an image look up none.
 """
 
 from __future__ import annotations
@@ -25,7 +25,7 @@ _Scope = tuple[str, str]
 
 
 class Symbol(msgspec.Struct, frozen=True):
-    """Where the linker put a name; `space` is code, iram, xram, sfr or bit."""
+    """Address of a name from the linker; `space` is code, iram, xram, sfr or bit."""
 
     address: int
     space: str
@@ -90,7 +90,7 @@ _RECORD = re.compile(r"^([CDB]:)?\s+([0-9A-F]{8})\s+(?:(_\w+)\s|(A\$))")
 
 @lru_cache(_KEPT)
 def parse_map(text: str) -> MapFile:
-    """An SDCC (ASxxxx) map file: the area that a page is headed with tells the space of its names."""
+    """Parses an SDCC (ASxxxx) map file: the area in a page's heading gives the space of its names."""
     names: dict[str, Symbol] = {}
     places: list[CodePlace] = []
     instructions: dict[int, int] = {}
@@ -278,7 +278,7 @@ class Symbols:
         return None
 
     def find(self, name: str) -> Symbol | None:
-        """Where the name is. Raises ImageError as `names` does."""
+        """The symbol of this name; None if there is none. Raises ImageError as `names` does."""
         return self.names.get(name) or self.names.get("_" + name)
 
     @cached_property

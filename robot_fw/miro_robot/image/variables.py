@@ -47,7 +47,10 @@ class Variable(msgspec.Struct, frozen=True):
 
 
 class Variables(msgspec.Struct, frozen=True, eq=False):
-    """Of one debug file. `structs`: members by module and tag. `unplaced`: bits, of which that file has no address."""
+    """The variables of one debug file. `structs`: members by module and tag.
+
+    `unplaced`: bits, whose addresses are not in that file.
+    """
 
     by_name: dict[str, tuple[Variable, ...]]
     structs: dict[str, dict[str, tuple[Member, ...]]]
@@ -60,7 +63,7 @@ class Variables(msgspec.Struct, frozen=True, eq=False):
 
 @lru_cache(_KEPT)
 def parse_variables(text: str) -> Variables:
-    """Those of a debug file's text; records that are damaged or of an unknown type are left out."""
+    """Parses the variables of a debug file; damaged records and records of unknown types are left out."""
     declared: dict[tuple[str, str, str], tuple[CType, str, str]] = {}
     structs: dict[str, dict[str, tuple[Member, ...]]] = {}
     scopes: dict[str, dict[str, Variable]] = {}
@@ -113,9 +116,9 @@ def _members(text: str) -> Iterable[Member]:
 
 
 def variables_of(image: Image) -> Variables:
-    """Those of the `.cdb` beside an image, none if there is no such file. Raises ImageError for another image's.
+    """The variables from the `.cdb` beside an image; empty without that file.
 
-    Where a bit lies is taken from the instructions in the listings.
+    Raises ImageError if it is another image's. The addresses of bits are taken from the instructions in the listings.
     """
     _ = image.symbols.names  # compares the files with the image
     parsed = parse_variables(read_text(image.path.with_suffix(".cdb")))

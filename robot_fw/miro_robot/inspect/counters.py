@@ -1,7 +1,6 @@
-"""What a CPU spent its time on: how often each instruction ran, how long it took and which way its branch went; besides
-that interrupts, sleep, and how deep its stack went.
+"""Counts of a CPU: executions, cycles and branch directions of each instruction; interrupts, sleep, and stack depth.
 
-What functions, lines and percentages follow from it is in `profile.py` and `coverage.py`.
+Functions, lines and percentages are computed from them in `profile.py` and `coverage.py`.
 
 The latency of an interrupt is counted as Atmel's 8051 Hardware Manual does (4316E, section 2.16, response time): full
 machine cycles between the one in which the flag is latched and the first one of the routine; 3 at least. A request that
@@ -23,7 +22,7 @@ class Counters(Watcher):
     """Counts by code address; one object may watch several CPUs that run the same image.
 
     `executed_at(a)`: times the instruction at `a` ran; `cycles_at(a)`: machine cycles it took; `jumped_at(a)`: times
-    the program went on somewhere else than after it.
+    the program continued elsewhere than behind it.
     """
 
     def __init__(self) -> None:
@@ -48,7 +47,7 @@ class Counters(Watcher):
         return self.jumps[address & 0xFFFF]
 
     def addresses(self) -> list[int]:
-        """Where instructions ran, ascending."""
+        """Addresses of executed instructions, ascending."""
         return [address for address in range(_SPACE) if self.executions[address]]
 
 

@@ -20,11 +20,11 @@ from miro_robot.inspect.symbol_names import SymbolNames
 from miro_robot.mcs51.opcodes import is_conditional
 
 Counts = dict[int, tuple[int, int]]
-"""By address: how often the instruction ran, and how often it went on elsewhere than after itself."""
+"""Address -> executions of the instruction, and how often it continued elsewhere than behind itself."""
 
 
 class Share(msgspec.Struct, frozen=True):
-    """So many of so many."""
+    """A number of items out of a total."""
 
     hit: int
     total: int
@@ -89,7 +89,7 @@ def by_listing(image: Image, counts: Counts) -> tuple[str, FileRecord]:
 
 
 def _count(record: FileRecord, line: int, row: ListingRow, counts: Counts) -> None:
-    """One instruction's part in a line."""
+    """Adds one instruction to a line's record."""
     executed, jumped = counts.get(row.address, (0, 0))
     record.lines[line] = max(record.lines.get(line, 0), executed)
     if is_conditional(row.data[0]) and row.data[-1]:  # SDCC compares by a CJNE that jumps nowhere

@@ -1,4 +1,4 @@
-"""Where the values in a function's registers come from before each of its instructions, and which are read later.
+"""The origin of the values in a function's registers before each of its instructions, and their later uses.
 
     entry ──► MOV R7,DPL ──► PUSH AR7 ──► LCALL ──► POP AR7 ──► ..     R7 holds what DPL held at the entry, up to the
                                                                        next instruction that writes it otherwise
@@ -23,15 +23,15 @@ Origin = tuple[int, int]
 Held = dict[int, frozenset[Origin]]
 _MOST_ORIGINS = 8
 _ANY: frozenset[Origin] = frozenset({(-2, -1)})
-"""From where cannot be told."""
+"""Unknown origin."""
 _OPERANDS = {row[0]: (row[3], row[4].split(",")) for row in TABLE}
 _COPIES, _CHANGES_NOTHING = ("MOV", "XCH", "PUSH", "POP"), ("CJNE", "JZ", "JNZ", "JB", "JNB", "PUSH", "JMP")
 
 
 class Effect(msgspec.Struct, frozen=True):
-    """What an instruction does to places. `moves`: (to, from); `writes`: all that it writes, moves too.
+    """Effect of an instruction on places. `moves`: (to, from); `writes`: all places written, including moves.
 
-    `constant`: the number that it has, which may be an address; -1 for none.
+    `constant`: its immediate number, which may be an address; -1 for none.
     """
 
     mnemonic: str
@@ -42,7 +42,10 @@ class Effect(msgspec.Struct, frozen=True):
 
 
 def effect(code: bytes, address: int, bank: int) -> Effect:
-    """Of the instruction there, with R0 as the first register of `bank` (0, 8, 16, 24). Calls are not followed."""
+    """The effect of the instruction there, with R0 as the first register of `bank` (0, 8, 16, 24).
+
+    Calls are not followed.
+    """
     opcode, first, second = (code[(address + at) & 0xFFFF] for at in range(3))
     mnemonic, words = _OPERANDS[ROW[opcode]]
     places: dict[str, tuple[int, ...]] = {
@@ -73,19 +76,19 @@ def effect(code: bytes, address: int, bank: int) -> Effect:
 
 
 class Callees:
-    """What functions may write, with all that they call. `code` as of an image."""
+    """The places that functions may write, including their callees. `code` as in an image."""
 
     def __init__(self, reader: StackReader) -> None:
         self.reader = reader
         self._known: dict[tuple[int, int], tuple[set[int], list[int]]] = {}
 
     def writes(self, entry: int, bank: int) -> frozenset[int]:
-        """Of the function at `entry`; all registers where its code does not tell."""
+        """Places that the function at `entry` may write; all registers if its code is not understood."""
         entries = _reached([entry], lambda called: self._own(called, bank)[1])
         return frozenset[int]().union(*(self._own(called, bank)[0] for called in entries))
 
     def _own(self, entry: int, bank: int) -> tuple[set[int], list[int]]:
-        """What it writes itself, and whom it calls."""
+        """Places that it writes itself, and the entries of its callees."""
         if (entry, bank) not in self._known:
             code, written, called = self.reader.code, set[int](), []
             reached = self.reader.heights(entry)
@@ -106,9 +109,10 @@ def places_of(bank: int) -> tuple[int, ...]:
 
 
 class Flow:
-    """Of the function at `entry`, whose registers are those of `bank`.
+    """Data flow of the function at `entry` with the registers of `bank`.
 
-    `held`: instruction -> what its places hold; `live`: instruction -> places that are read before they are written.
+    `held`: instruction -> origins of the values in its places; `live`: instruction -> places that are read before they
+    are written.
     """
 
     def __init__(self, callees: Callees, entry: int, bank: int) -> None:
@@ -202,7 +206,7 @@ class Flow:
 
 
 def _reached(first: Iterable[int], after: Callable[[int], Iterable[int]]) -> set[int]:
-    """All places that one comes to from the first ones, these too."""
+    """All places reachable from `first`, including these."""
     reached, waiting = set[int](), [*first]
     while waiting:
         place = waiting.pop()

@@ -1,4 +1,4 @@
-"""What the sanitizer saw, as sentences about C: where, which variable, and what comes between."""
+"""The sanitizer's observations as sentences about C: place, variable, and the interrupting line."""
 
 from __future__ import annotations
 
@@ -82,14 +82,14 @@ class Finding(msgspec.Struct, frozen=True, order=True):
 
     @property
     def cause(self) -> tuple[str, ...]:
-        """What findings of one cause share: of shared bytes, who needs them, and which routine comes."""
+        """Findings with this key have the same cause: for shared bytes, the users and the interrupting routine."""
         if self.kind == "overlay":
             return (self.kind, self.function, f"{self.source}")
         return (self.kind, self.place, self.variable)
 
     @property
     def key(self) -> str:
-        """What an allow line begins with."""
+        """The beginning of an allow line for this finding."""
         return " ".join(filter(None, (self.kind, self.place, self.variable)))
 
     def __str__(self) -> str:
@@ -106,7 +106,7 @@ class Reader:
         self.code = image.code
 
     def findings(self, seen: Sanitizer) -> list[Finding]:
-        """One for each cause: what happened goes before what may."""
+        """One finding for each cause; observed ones have precedence over possible ones."""
         best: dict[tuple[str, ...], Finding] = {}
         for finding in sorted(self._all(seen), key=lambda finding: (not finding.did, finding.tick, finding)):
             best.setdefault(finding.cause, finding)

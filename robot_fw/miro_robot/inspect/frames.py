@@ -1,4 +1,4 @@
-"""Which functions are under way: read from the stack, by what the code says of its height at each instruction.
+"""Unwinds the stack: the active functions, from the stack's height that the code implies at each instruction.
 
               ┌ base: where the return address of the function ends
 .. | caller's | low high | what the function pushed so far | free ..
@@ -22,10 +22,10 @@ _LCALL_BYTES, _ACALL_BYTES = 3, 2
 
 
 class StackFrame(msgspec.Struct, frozen=True):
-    """A function under way: `pc` is what it executes next, `entry` where it was entered, `base` SP at that moment.
+    """An active function: `pc`: its next instruction, `entry`: its first executed address, `base`: SP at its entry.
 
-    `place`: what it executes, which for an outer frame is the call. `by_interrupt`: the hardware called it. `known`:
-    whether the frames outside of it can be told.
+    `place`: the present instruction, for an outer frame the call. `by_interrupt`: called by hardware. `known`: the
+    outer frames can be determined.
     """
 
     pc: int
@@ -95,13 +95,14 @@ class Unwinder:
                         waiting.append(place)
 
     def base(self, cpu: Cpu) -> int:
-        """Of the function that `cpu` is in; SP itself where the code does not tell."""
+        """`base` of the CPU's present function; SP itself if the code does not allow to compute it."""
         return cpu.sp - self.heights.get(cpu.pc, (0, 0))[0]
 
     def frames(self, cpu: Cpu, shifted: int = -1, by: int = 0) -> list[StackFrame]:
-        """From the innermost outwards. The last one is `known` if it is that of reset.
+        """Active functions, innermost first.
 
-        `by`: so many bytes more than the code says were pushed by the function of frame `shifted`.
+        The last one is `known` if it is that of reset. `by`: bytes that the function of frame `shifted` pushed beyond
+        those its code implies.
         """
         frames: list[StackFrame] = []
         pc, place, sp = cpu.pc, cpu.pc, cpu.sp
@@ -141,7 +142,7 @@ class Unwinder:
         return None
 
     def call_before(self, address: int) -> int:
-        """Where the call stands that returns to `address`; -1 where none does."""
+        """Address of the call that returns to `address`; -1 if there is none."""
         for size in (_LCALL_BYTES, _ACALL_BYTES):
             place = (address - size) & 0xFFFF
             # By size: the last two bytes of an LCALL may look like an ACALL.

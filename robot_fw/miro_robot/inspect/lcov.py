@@ -14,7 +14,7 @@ import msgspec
 from miro_exact.bad_input import BadInput
 
 Branch = tuple[int, int, int]
-"""(line, block, branch): a block is one conditional jump of the line, branch 0 jumps, branch 1 goes on."""
+"""(line, block, branch): a block is one conditional jump of the line; branch 0 is taken, branch 1 is not."""
 
 _NUMBER = r"[0-9]{1,18}"
 _RECORDS = {
@@ -36,7 +36,7 @@ _USE_LCOV = "add the files up with `lcov --add-tracefile`"
 
 
 class FileRecord(msgspec.Struct):
-    """One source file. Counts by line; functions as name -> (line, count); a branch that was never come to is None."""
+    """One source file. Counts by line; functions as name -> (line, count); a branch that was never reached is None."""
 
     lines: dict[int, int] = msgspec.field(default_factory=dict)
     functions: dict[str, tuple[int, int]] = msgspec.field(default_factory=dict)

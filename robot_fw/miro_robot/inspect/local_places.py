@@ -1,4 +1,4 @@
-"""Where the value of a local variable is before an instruction, or why that cannot be told.
+"""Finds the place of a local variable's value before an instruction, or the reason why it is unknown.
 
 The debug file names a home for each variable and no times. Arguments arrive by the compiler's convention: the first
 one that is no bit in DPL, DPH, B, A, low byte first (SDCC manual, "Global Registers used for Parameter Passing"), and
@@ -26,8 +26,8 @@ _FIRST_SFR, _PSW, _PUSH = 0x80, SFRS["PSW"], 0xC0
 
 
 class _Argument:
-    """The one that arrives in registers. `home`: its bytes in registers or `memory`; `prologue`: the instructions that
-    bring it there, and the one after them.
+    """The argument that arrives in registers. `home`: its bytes in registers or `memory`; `prologue`: the instructions
+    that bring it there, and the one after them.
     """
 
     def __init__(self, name: str, home: tuple[int, ...], memory: range, prologue: list[int]) -> None:
@@ -38,7 +38,7 @@ class _Argument:
 
 
 class LocalPlaces:
-    """Of one function of an image."""
+    """Places of the local variables of one function of an image."""
 
     def __init__(
         self,
@@ -68,7 +68,7 @@ class LocalPlaces:
     # The argument that arrives in registers
 
     def _argument(self, variables: Variables) -> _Argument | None:
-        """None where there is none, or it cannot be told which one it is."""
+        """The register argument; None if there is none or if it is ambiguous."""
         arguments = []
         for parameter in self.parameters:
             memory = self._memory(parameter, variables)
@@ -94,7 +94,7 @@ class LocalPlaces:
         return pointer is not None and code == bytes((_PUSH, pointer.address))
 
     def _memory(self, variable: LocalVariable, variables: Variables) -> range:
-        """Where it lies in a memory that has addresses."""
+        """The addresses of a variable in memory."""
         there = [each for each in variables.by_name.get(variable.name, ()) if each.scope == self.name]
         there = [each for each in there if each.module == self.module] or there
         return range(there[0].address, there[0].address + variable.type.size) if len(there) == 1 else range(0)
@@ -163,11 +163,11 @@ class LocalPlaces:
     # Where it is
 
     def visible(self, pc: int) -> list[LocalVariable]:
-        """Those in registers or on the stack that the C of an instruction could name; inner ones first."""
+        """Variables in registers or on the stack in scope at an instruction; inner ones first."""
         return self.blocks.visible(self.own, self.function.first, pc)
 
     def of(self, variable: LocalVariable, pc: int) -> tuple[int, ...] | str:
-        """The bytes of a variable in registers, low byte first, or why they cannot be told."""
+        """Places of the bytes of a register variable, low byte first, or the reason why they are unknown."""
         key = (variable, pc)
         if key not in self._of:
             self._of[key] = self._is_at(variable, pc)
@@ -227,7 +227,7 @@ class LocalPlaces:
         return needed and any(self._same(here, there, home) for there in self._kept(variable, home))
 
     def _kept(self, variable: LocalVariable, home: tuple[int, ...]) -> list[Held]:
-        """What is held where a C line begins that may name it, and its home is needed later."""
+        """The values at the begins of C lines in the variable's scope, if its home is needed later."""
         return [
             self.flow.held[address]
             for address in self.line_begins
@@ -246,7 +246,8 @@ class LocalPlaces:
         return len(reached) == len(waiting)
 
     def in_memory(self, name: str, memory: range, in_ram: bool, pc: int) -> tuple[int, ...] | str:
-        """The registers where a parameter is that has a place in memory, none if it is there, or why it cannot be told.
+        """The registers that hold a parameter with a place in memory; none if it is in memory; or the reason why it is
+        unknown.
 
         `in_ram`: the memory is internal RAM, so that instructions name its bytes.
         """

@@ -1,4 +1,4 @@
-"""A question at marked instructions, asked in passing while the CPU runs at its full speed from mark to mark."""
+"""Evaluates a condition at marked instructions; between marks the CPU runs at full speed."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Where the time went: a profile of one CPU, as data."""
+"""The profile of one CPU, as data."""
 
 from __future__ import annotations
 
@@ -51,7 +51,7 @@ class Profile(msgspec.Struct, frozen=True):
 
 
 def profile(image: Image, counters: Counters, activity: Activity) -> Profile:
-    """Of a CPU that ran `image` under both watchers."""
+    """The profile of a CPU that ran `image` under both watchers."""
     names = SymbolNames(image)
     by_function: dict[int, list[int]] = {}
     for address in counters.addresses():

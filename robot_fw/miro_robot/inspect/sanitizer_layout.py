@@ -1,4 +1,4 @@
-"""What the sanitizer knows of an image before it runs: C lines, the bytes of variables, and what instructions touch."""
+"""Static data of an image for the sanitizer: C lines, the bytes of variables, and accesses of instructions."""
 
 from __future__ import annotations
 
@@ -135,7 +135,7 @@ def _of_keil(image: Image, keil: KeilMap, lines: dict[int, int]) -> Iterator[tup
 
 
 def _shared(image: Image) -> tuple[dict[int, tuple[int, int]], dict[tuple[int, str], str]]:
-    """What the map alone says: the area of overlays, and parameters of library functions."""
+    """Data from the map alone: the area of overlays, and parameters of library functions."""
     symbols = image.symbols.names
     in_ram = sorted({symbol.address for symbol in symbols.values() if symbol.space == "iram"})
     records = _LOCAL_PLACE.findall(read_text(image.path.with_suffix(".cdb")))

@@ -1,4 +1,4 @@
-"""How deep the stack of an image goes at least, read from its code alone.
+"""A lower bound of an image's stack depth, from its code alone.
 
     reset ──► start-up ──► main ──► function ──► function        calls: 2 bytes each, PUSH, room for local variables
     interrupt ──► routine ──► function                           comes on top of wherever the others are
@@ -48,7 +48,7 @@ class StackDepth(msgspec.Struct, frozen=True):
 
     @property
     def size(self) -> int:
-        """At least so many bytes, with the deepest interrupt at the deepest place."""
+        """Lower bound in bytes, with the deepest interrupt at the deepest place."""
         return self.main.size + (self.interrupt.size + _CALL_BYTES if self.interrupt else 0)
 
     @property
@@ -73,14 +73,14 @@ class StackReader:
         self._under_way: list[int] = []
 
     def all(self) -> StackDepth:
-        """Of the whole image."""
+        """The depth of the whole image."""
         begun = [at for at in VECTORS if self._loaded(at) and self.code[at] in _FIRST_OF_VECTORS]
         interrupts = [self.depth(at) for at in begun]
         deepest = max(interrupts, key=lambda depth: depth.size, default=None)
         return StackDepth(self.depth(0), deepest)
 
     def depth(self, entry: int) -> Depth:
-        """Of the function that begins there, with all that it calls."""
+        """The depth of the function at `entry`, with all its callees."""
         if entry in self._known:
             return self._known[entry]
         if entry in self._under_way:
@@ -133,7 +133,7 @@ class StackReader:
         return {address: at.height for address, at in reached.items()}, unknown
 
     def successors(self, address: int, size: int = 0) -> list[int]:
-        """Where it may go on after an instruction, or after `size` bytes; calls return."""
+        """Addresses of the next instructions after one, or after `size` bytes; calls return."""
         opcode = self.code[address]
         size = size or LENGTH[opcode]
         following = [address + size] if goes_on(opcode) else []
@@ -148,7 +148,7 @@ class StackReader:
             address += LENGTH[self.code[address]]
 
     def _after(self, address: int, at: _At) -> tuple[int, _At, set[str]]:
-        """Bytes of code taken, what holds after them, and what could not be told."""
+        """Bytes of code consumed, the state after them, and unknown effects."""
         code = self.code[address : address + len(_FRAME)].ljust(len(_FRAME), b"\0")
         opcode, size, height = code[0], LENGTH[code[0]], at.height
         for form, frame in ((_ROOM, at.frame), (_FRAME, height)):
@@ -172,7 +172,7 @@ class StackReader:
         return size, at, {"SP set by a value that is not known"}
 
     def _branch(self, address: int) -> int | None:
-        """Where a jump goes; None for what is not one, and for calls."""
+        """Target of a jump; None for other instructions, and for calls."""
         opcode = self.code[address]
         if opcode == _SJMP or is_conditional(opcode):
             size = LENGTH[opcode]

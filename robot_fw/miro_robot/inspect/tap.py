@@ -1,4 +1,4 @@
-"""Where the wires of a board are picked up: levels with the exact ticks at which they change.
+"""Records the wires of a board: levels with the exact ticks of their changes.
 
 Lines, CPU, chips and plant run ahead of each other, so changes are not noted in the order of their ticks;
 below the tick that `CpuTap.known` gives, all changes have been noted.
@@ -40,8 +40,10 @@ PLACES = (
         for pin in ("cs", "rd", "wr", "ps", "rst", "busy", "hi", "pwm", "sign", "magnitude", "a", "b")
     ),
 )
-"""What the places are; the nets of a board of parts follow, by number. `shift`: what the serial port in mode 0 puts on
-RXD; `outside`: what is wired to a port puts on its pins; `low` and `high`: a routine of that priority is in service."""
+"""Names of the places; the nets of a board of parts follow, by number. `shift`: level that the serial port drives onto
+RXD in mode 0; `outside`: levels driven onto a port's pins from outside; `low` and `high`: a routine of that priority is
+in service.
+"""
 
 UNKNOWN = 2
 """Value of a routine's wire for a routine that was already running when recording began."""
@@ -109,7 +111,7 @@ class BoardTap(Probe):
         self._look(tick)
 
     def _look_at_pins(self, tick: int) -> None:
-        """What only the CPU can move: the inputs of the chips, and the bus, which they answer on at once."""
+        """Samples the wires that only the CPU changes: inputs of the chips, and the bus, where chips answer at once."""
         board = self.board
         self._see(tick, _DATA, board.bank[board.data_bank] & board.bus_levels)
         pins = board._pins()
@@ -118,7 +120,7 @@ class BoardTap(Probe):
             self._see(tick, _SIDE + _PER_SIDE + _CS + pin, pins >> (_CHIP_PINS + pin) & 1)
 
     def _look(self, tick: int) -> None:
-        """What chips put out by themselves, and the CPU's pins that follow."""
+        """Samples outputs that chips change on their own, and the CPU's pins that follow."""
         board = self.board
         for port in range(4):
             shorted = board.cpu.peripherals.ports.stuck_high[port]
@@ -201,7 +203,7 @@ class NetTap:
 
 
 class CpuTap(Watcher):
-    """Notes what happens on a CPU, and on the board around it if there is one, into `events`.
+    """Records the events on a CPU, and on its board if there is one, into `events`.
 
     Begins where it is attached, at `begin_tick`, with `start` as the levels there. After every run it calls `told`.
     """
@@ -291,7 +293,7 @@ class CpuTap(Watcher):
         self.start += nets
 
     def _look(self, cpu: Cpu) -> None:
-        """What an instruction may have changed: with effect from the next cycle."""
+        """Samples everything that an instruction may have changed, effective from the next cycle."""
         tick = _TICKS * cpu.cycles
         for port in range(4):
             self._see(tick, _LATCH + port, cpu.peripherals.ports.driven(port))
@@ -311,7 +313,10 @@ class CpuTap(Watcher):
             self.routine[high] = -1
 
     def _take_outputs(self, cpu: Cpu) -> None:
-        """Those that are known: a line without a listener keeps some thousand edges. The end of a run settles it."""
+        """Takes the known edges: a line without a listener stores some thousand of them.
+
+        The end of a run settles it.
+        """
         self._take_line(_TXD, cpu.txd, _TICKS * cpu.cycles)
         self._take_line(_SHIFT, cpu.peripherals.shift.data, _TICKS * cpu.cycles)
 

@@ -17,7 +17,8 @@ _XRAM_BYTES = 0x10000
 
 
 def read_value(cpu: Cpu, image: Image, name: str, as_type: str = "") -> Any:
-    """What the variable `name` holds now: int (pointers too), float, bool, a list for an array, a dict for a struct.
+    """The present value of the variable `name`: int (pointers, too), float, bool, a list for an array, a dict for a
+    struct.
 
     `name` and `as_type` as in `find_variable`. Ports are read at their latch. Raises BadInput for a name that is not
     there, and one in external RAM that the board lacks.
@@ -49,7 +50,7 @@ def write_value(cpu: Cpu, image: Image, name: str, value: Any, as_type: str = ""
 
 
 def bytes_at(cpu: Cpu, image: Image, variable: Variable) -> bytes:
-    """As many bytes as the type has, from the place where the variable lies."""
+    """The bytes of a variable, as many as its type has."""
     space, address = variable.space, variable.address
     if space == "bit":
         return bytes([cpu_bit(cpu, address)])

@@ -1,4 +1,4 @@
-"""Runs a CPU step by step and tells watchers what it did.
+"""Runs a CPU step by step and reports each step to watchers.
 
 Each watcher has its own file. The CPU's hot loop stays free of all this: without an inspector it costs one test per
 run.
@@ -22,7 +22,7 @@ class Watcher:
         """The watcher was attached."""
 
     def resumed(self, cpu: Cpu) -> None:
-        """The CPU is where the watcher saw it last, after a piece of which it was told nothing (`Inspector.pause`)."""
+        """The CPU is where the watcher saw it last, after a piece that was not reported to it (`Inspector.pause`)."""
 
     def detached(self, cpu: Cpu) -> None:
         """The watcher was detached."""
@@ -72,7 +72,7 @@ class Inspector:
             watcher.resumed(self.cpu)
 
     def run(self, until_cycle: int) -> int:
-        """What `Cpu.run_alone` does, in steps; the same state comes out, and the same reason for stopping."""
+        """Like `Cpu.run_alone`, but step by step; with the same final state and the same reason for stopping."""
         cpu = self.cpu
         began = cpu.cycles
         reason = 0
@@ -137,7 +137,7 @@ class Inspector:
 
 
 def attach(cpu: Cpu, *watchers: Watcher) -> Inspector:
-    """From now on `watchers` are told what `cpu` does, beside those that are told already."""
+    """Reports the steps of `cpu` to `watchers` from now on, besides those attached before."""
     inspector = cpu.inspector
     if not isinstance(inspector, Inspector):
         inspector = Inspector(cpu)
@@ -149,7 +149,7 @@ def attach(cpu: Cpu, *watchers: Watcher) -> Inspector:
 
 
 def detach(cpu: Cpu, *watchers: Watcher) -> None:
-    """They are told no more; the last one to go gives the CPU its hot loop back."""
+    """Detaches watchers; without any the CPU runs in its hot loop again."""
     inspector = cpu.inspector
     if isinstance(inspector, Inspector):
         inspector.watchers = [watcher for watcher in inspector.watchers if watcher not in watchers]

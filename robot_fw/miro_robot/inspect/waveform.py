@@ -1,4 +1,4 @@
-"""What happened on the wires of a board, as a VCD file, and the save file with which GTKWave shows it.
+"""Writes the wires of a board as a VCD file, with a save file for GTKWave.
 
 Time stamps are nanoseconds, rounded down (tick * 125 // 3 at 24 MHz, as in recordings): a crystal's period fits no
 decimal timescale, and this one loses nothing, since rounding up gives the tick again.
@@ -44,7 +44,7 @@ class Signal(NamedTuple):
         return ".".join([TOP, *([self.scope] if self.scope else []), wire])
 
     def places(self) -> list[int]:
-        """Where the levels that it follows from are noted."""
+        """Places in the tap from whose levels it is computed."""
         if self.place in PLACES:
             return [PLACES.index(self.place)]
         if self.place.startswith("net"):
@@ -163,7 +163,7 @@ class Waveform:
 
     @property
     def first_tick(self) -> int:
-        """Where the file begins."""
+        """First tick of the file."""
         begin = self.tap.begin_tick
         return max(self._first_tick, begin + SETTLING_TICKS if begin > 0 else 0)
 
@@ -246,7 +246,7 @@ class Waveform:
             self._shown[index] = level
 
     def _level_of(self, index: int) -> int:
-        """What a signal's wires carry now; a pin of a port is the AND of all that drive it."""
+        """Present level of a signal's wires; the pin of a port is the AND of all its drivers."""
         place, *more = self._places[index]
         return port_pins(self._levels, place - _LATCH) if more else self._levels[place]
 

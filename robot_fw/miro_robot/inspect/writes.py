@@ -77,11 +77,11 @@ class Bytes:
         return mine == others
 
     def writers(self, code: bytes, instructions: Iterable[int], on_stack: bool = True) -> set[int]:
-        """Those of the `instructions` that may write one of them. `on_stack`: the stack may reach them."""
+        """The `instructions` that may write one of the bytes. `on_stack`: the stack may reach them."""
         return {address for address in instructions if self._may(code, address, on_stack)}
 
     def readers(self, code: bytes, instructions: Iterable[int], on_stack: bool = True) -> set[int]:
-        """Those of the `instructions` that may read one of them. `on_stack`: the stack may reach them."""
+        """The `instructions` that may read one of the bytes. `on_stack`: the stack may reach them."""
         return {address for address in instructions if self._may_read(code, address, on_stack)}
 
     def are_read(self, cpu: Cpu) -> bool:
@@ -214,7 +214,7 @@ def _moves_sp(opcode: int) -> bool:
 
 
 def _at(direct: int) -> tuple[str, int]:
-    """What a direct address means."""
+    """Space and address of a direct address."""
     return ("iram" if direct < _FIRST_SFR else "sfr"), direct
 
 
@@ -234,7 +234,7 @@ def cpu_bit(cpu: Cpu, bit: int) -> int:
 
 
 def instructions_of(code: bytes, used: Iterable[tuple[int, int]], known: Iterable[int]) -> set[int]:
-    """Where instructions may begin: the `known` places, and those one after the other from each of them on."""
+    """Possible starts of instructions: the `known` ones, and those that follow each of them."""
     addresses: set[int] = set()
     loaded = [range(first, end) for first, end in used]
     waiting = sorted({*known, *(span.start for span in loaded)})

@@ -20,7 +20,7 @@ _FIT_15 = ("i", 0, 0x7FFF)
 
 
 COMPLETED, OUT_OF_RANGE = 1, 2
-"""What a word led to: an acceleration is complete; its parameter was out of range."""
+"""Result of a word: it completed an acceleration; its parameter was out of range."""
 
 _STOPS, _MODES = STOPS, VELOCITY_MODE | FORWARD
 _ACCELERATION, _VELOCITY, _POSITION = ACCELERATION, VELOCITY, POSITION
@@ -92,7 +92,7 @@ class TrajectoryBuffer:
         return self.words_due()
 
     def words_due(self) -> int:
-        """How many words are still to come: two a parameter."""
+        """Number of words still expected: two per parameter."""
         parameters = (self.due >> 5 & 1) + (self.due >> 3 & 1) + (self.due >> 1 & 1)
         return 2 * parameters - (1 if self.half >= 0 else 0)
 
@@ -201,7 +201,7 @@ class FilterBuffer:
         return self.words_due()
 
     def words_due(self) -> int:
-        """How many words are still to come: one a coefficient."""
+        """Number of words still expected: one per coefficient."""
         return (self.due >> 3 & 1) + (self.due >> 2 & 1) + (self.due >> 1 & 1) + (self.due & 1)
 
     def word(self, word: int, clamp: int = 0) -> int:

@@ -1,7 +1,7 @@
 """The LM629's bus limits, against the ticks at which its pins move.
 
-What the bytes mean is in `host_port.py`; the board reports violations. The modelled chip goes on as if the access was
-in time: what silicon does after a violation is not documented.
+The meaning of the bytes is in `host_port.py`; the board reports violations. The modelled chip continues as if the
+access were in time, because real behaviour after a violation is not documented.
 
 A tick is 125/3 ns. Only edges within one instruction can be too close: those of two instructions are at least 8
 ticks (333 ns) apart, from a port pin that moves as one ends to the address that a MOVX puts out in the next. So

@@ -230,7 +230,7 @@ class Lm629:
     # ------------------------------------------------------------------------------------------ time
 
     def advance(self, tick: int) -> None:
-        """Do everything the chip does by itself up to and including `tick`."""
+        """Executes everything the chip does on its own up to and including `tick`."""
         while self.next_tick <= tick:
             now = self.next_tick
             if self.mode != _RUNNING:
@@ -287,7 +287,7 @@ class Lm629:
             self.next_tick = now + 16 * self.pwm_magnitude
 
     def _sample(self, now: int) -> None:
-        """One sample; its order is chosen (README.md, "Inside a sample")."""
+        """Computes one sample; its order is chosen (README.md, "Inside a sample")."""
         # First, so that STT, error and breakpoint all count from the positions of this sample.
         flags = self._latch_position(now)
         if self.start_taken:
@@ -363,7 +363,7 @@ class Lm629:
         return 0
 
     def _show_start(self, control: int) -> None:
-        """What STT does to the signals: with an order to turn the motor off it leaves bit 7 to what comes of it."""
+        """Sets the signals for STT; for an order to turn the motor off, bit 7 is set by its result."""
         cleared = _ON_TARGET | _VELOCITY_MODE | _FORWARD
         self.signals.word &= ~(cleared if control & _TURN_OFF else cleared | _MOTOR_OFF)
         self.signals.word |= control & (_VELOCITY_MODE | _FORWARD)
@@ -376,7 +376,7 @@ class Lm629:
             self.pid.open_loop()
 
     def _relative_base(self) -> int:
-        """What a relative position adds to (T6)."""
+        """The base to which a relative position is added (T6)."""
         if self.options.relative_base == "real":
             return self.real_position
         if self.options.relative_base == "target" and not self.trajectory.velocity_mode:
@@ -431,7 +431,9 @@ class Lm629:
             self.sign = 0
 
     def _check_breakpoint(self) -> int:
-        """It is reached by the counts of this sample alone: the border of the position space and DFH move nothing."""
+        """Checks the breakpoint against this sample's counts only: the wrap of the position space and DFH do not
+        trigger it.
+        """
         if not self.breakpoint_armed:
             return 0
         counts = self.real_velocity
@@ -548,7 +550,7 @@ class Lm629:
             self.signals.raise_flags(_COMMAND_ERROR)
 
     def _accept_start(self, tick: int) -> None:
-        """STT is refused when it would change the acceleration of a motion that goes on (T2).
+        """STT is refused if it would change the acceleration of a continuing motion (T2).
 
         An order that waits for its sample decides whether there is one, else the flags.
         """
@@ -583,7 +585,7 @@ class Lm629:
         self.signals.word &= ~_ACCELERATION_LOADED
 
     def _answer(self, tick: int, opcode: int) -> int:
-        """What a reading command says, as it is when the command arrives."""
+        """The data of a reading command at its arrival."""
         # Now, not when the words are read: both words of a position have to be of one moment.
         if opcode == _RDSIGS:
             return self.signals.word
@@ -711,7 +713,7 @@ class Lm629:
         return _WORDS_IN[self.port.command]
 
     def check_times(self, earliest_tick: int) -> None:
-        """Raises ValueError unless a restored chip goes on at `earliest_tick` or soon after."""
+        """Raises ValueError unless a restored chip continues at `earliest_tick` or soon after."""
         latest_tick = earliest_tick + 2 * _SAMPLE_TICKS
         if self.next_tick < earliest_tick or (self.mode == _RUNNING and self.next_tick > latest_tick):
             raise ValueError(f"next_tick is {self.next_tick}, not from {earliest_tick} to {latest_tick}")
@@ -725,7 +727,7 @@ class Lm629:
             )
 
     def _due_tick(self) -> int:
-        """What `next_tick` follows from while the chip runs: a sample, the end of a period or an edge of its pulse.
+        """Source of `next_tick` while the chip runs: a sample, the end of a PWM period or an edge of its pulse.
 
         -1 when the period is none of the four before the next sample, or there is a pulse of no length.
         """

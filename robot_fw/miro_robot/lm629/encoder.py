@@ -14,7 +14,7 @@ _COUNTS = ("q", -(1 << 40), 1 << 40)  # between two samples: far more than ticks
 
 
 class InputFilter:
-    """One input (A and B together are one): a level counts once `clocks` samples in a row have shown it.
+    """Digital filter of one input (A and B together are one): a level counts when `clocks` consecutive samples have it.
 
     Samples are taken at multiples of 4 ticks and see the level that was there just before. With 0 clocks
     there is no sampling at all: a level counts at once. `level` is what counts, `due` the tick at which
@@ -110,7 +110,10 @@ class Encoder:
         self.caught_counts = 0
 
     def set_phases(self, tick: int, a: int, b: int) -> None:
-        """Levels of A and B from `tick` on. The first call tells where the wheel stands, nothing counts."""
+        """Sets the levels of A and B from `tick` on.
+
+        The first call sets the start position of the wheel and counts nothing.
+        """
         self.set_place(tick, (b + b) | (a ^ b))
 
     def set_place(self, tick: int, place: int) -> None:

@@ -13,9 +13,9 @@ from miro_exact.state import FLAG, TICK, Queue
 from miro_robot.lm629.options import DEFAULT_OPTIONS, Lm629Options
 
 NOTHING, COMMAND, WORD, ANSWERED, MISUSE = 0, 1, 2, 3, 4
-"""What a change of the pins led to: nothing yet; a
-command byte; a data word from the host (`word`); the host has read the last word of an answer; the host
-read or wrote when that was not due (command error)."""
+"""Result of a change of the pins: nothing yet; a command byte; a data word from the host (`word`); the host has read
+the last word of an answer; the host read or wrote when that was not due (command error).
+"""
 
 WHOLE, STUCK, DEAD = 0, 1, 2
 """`broken`, a fault: the port works; stays busy from the next command on, reset after reset; or takes nothing and
@@ -209,7 +209,7 @@ class HostPort:
             self.recorded += 1
 
     def data_bytes(self) -> bytes:
-        """Those of the command in progress."""
+        """The data bytes of the command in progress."""
         return bytes(self.record[: self.recorded])
 
     def _word_is_over(self, tick: int) -> None:

@@ -95,7 +95,9 @@ class Lm629Options(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fie
     breakpoint_exact: bool = False
     """P3: a breakpoint fires in a sample that ends on it; False: also when it was passed between two samples."""
     breakpoint_base: Literal["accepted", "working"] = "accepted"
-    """P5: SBPR adds to the target of the STT that was accepted last, or to that which a sample has executed."""
+    """P5: SBPR adds to the target of the last accepted STT ("accepted"), or to the one that a sample has executed
+    ("working").
+    """
     read_position: Literal["sample", "live"] = "sample"
     """P4: RDRP answers the position of the last sample, or the counter as it is."""
 

@@ -1,4 +1,4 @@
-"""What an LM629 has been told to do, read from its commands: the order to its wheel.
+"""Derives the order to an LM629's wheel from its commands.
 
 The control word of LTRJ is that of `buffers.py` (data sheet, table "trajectory control word"): bits 8 to 10 turn the
 motor off, stop abruptly, stop smoothly; bits 5, 3, 1 announce acceleration, velocity and position, bits 4, 2, 0 make
@@ -27,8 +27,8 @@ _NO_WORD = 1 << 30
 class WheelOrder:
     """The order in force, at first "off".
 
-    `velocity` of "drive", else 0, in 1/65536 count per sample. `acceleration`: that which was loaded when the order was
-    given, in 1/65536 count per sample^2. `abrupt`: whether it is a "stop" without a ramp.
+    `velocity` of "drive", else 0, in 1/65536 count per sample. `acceleration`: the one loaded when the order was given,
+    in 1/65536 count per sample^2. `abrupt`: a "stop" without a ramp.
     """
 
     NOT_STATE = ("*",)
@@ -37,7 +37,7 @@ class WheelOrder:
         self.begin()
 
     def begin(self) -> None:
-        """Nothing was told."""
+        """Resets: no command was received."""
         self.what: Literal["off", "stop", "drive"] = "off"
         self.velocity = 0
         self.acceleration = 0

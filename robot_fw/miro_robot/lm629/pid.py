@@ -57,7 +57,7 @@ class Pid:
         self.phase = 0
 
     def step(self, position_error: int) -> int:
-        """One sample of the closed loop. `position_error` in counts, any width; returns -32768..32767."""
+        """Computes one sample of the closed loop. `position_error` in counts, any width; returns -32768..32767."""
         # The filter works on 16 bits of the error (SNVS781, PID Compensation Filter).
         e = _saturated(position_error)
         self.error_sum = max(-0x800000, min(self.error_sum + e, 0x7FFFFF))

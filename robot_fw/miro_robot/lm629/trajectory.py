@@ -21,7 +21,7 @@ def _wrapped(position: int) -> int:
 
 
 def _stopping_distance(speed: int, acceleration: int) -> int:
-    """What a move at `speed` covers from now on, if every later sample is slower by `acceleration`."""
+    """Distance of a move that slows down from `speed` by `acceleration` at every later sample."""
     if speed == 0:
         return 0
     if acceleration == 0:
@@ -33,7 +33,7 @@ def _stopping_distance(speed: int, acceleration: int) -> int:
 
 
 class ProfileGenerator:
-    """Desired position and velocity, and the working copies of what the host asked for.
+    """Desired position and velocity, and the working copies of the host's parameters.
 
     `moving` is 1 while the profile has not finished. `crossed` is 1 when the last step left the 31-bit space.
     """
@@ -88,7 +88,7 @@ class ProfileGenerator:
         self.target = _wrapped((self.target - real_position) * 65536) >> 16
 
     def step(self) -> int:
-        """One sample. Returns 1 in the sample that ends the profile."""
+        """Computes one sample. Returns 1 in the sample that ends the profile."""
         self.crossed = 0
         if self.stopping:
             return self._slow_to_rest()

@@ -1,7 +1,7 @@
-"""What the CPU can reach: the only way from it to the outside.
+"""The interface from the CPU to the outside.
 
-What the calls do belongs to the board. Input goes the other way, pushed by the board: `Cpu.set_external` and the
-`rxd` Line. All ticks are those of the 24 MHz crystal; a machine cycle is 12 of them.
+The board implements the calls. Input goes the other way, pushed by the board: `Cpu.set_external` and the `rxd` Line.
+All ticks are those of the 24 MHz crystal; a machine cycle is 12 of them.
 """
 
 from __future__ import annotations

@@ -56,11 +56,11 @@ _FLOATING = 0xFF  # what an undriven external bus reads as (X4)
 _ONE_INSTRUCTION = 4  # cycles of the longest: what the hardware lets main level do between two interrupts
 
 on_load: ContextVar[Callable[[Any], object] | None] = ContextVar("on_load", default=None)
-"""Called with every CPU that gets an image: how coverage of a test session comes to CPUs that tests make."""
+"""Called with every CPU that gets an image; a test session's coverage attaches to CPUs through it."""
 
 
 class CpuInspector(Protocol):
-    """What looks into a running CPU (`miro_robot.inspect`)."""
+    """The interface of observers of a running CPU (`miro_robot.inspect`)."""
 
     def run(self, until_cycle: int) -> int: ...
 
@@ -155,12 +155,12 @@ class Chip:
         self.user_flags = value & 0x22  # F0 and UD, in their places
 
     def bound_stack(self, first: int, last: int) -> None:
-        """The stack may use internal RAM from `first` to `last`; all of it unless told. SP leaving it is a fault."""
+        """Limits the stack to internal RAM from `first` to `last` (default: all of it). SP outside of it is a fault."""
         self.stack_floor = max(first - 1, 0)
         self.stack_end = (last + 1) & 0xFF
 
     def stack_said(self) -> str:
-        """Where SP is and where the stack may be, for people."""
+        """Text with SP and the range of the stack, for people."""
         last = (self.stack_end - 1) & 0xFF
         return f"SP {self.sp:02X}h, its stack is {self.stack_floor + 1:02X}h to {last:02X}h"
 
@@ -180,7 +180,7 @@ class Chip:
             loaded(self)
 
     def _erase(self) -> None:
-        """All code memory reads FFh, and none of it is loaded."""
+        """Erases code memory: all of it reads FFh, and none is loaded."""
         for address in range(0x10002):
             self.rom[address] = 0xFF
         for address in range(0x10000):
@@ -192,7 +192,7 @@ class Chip:
         return line & 0x07FF | ((address + (line >> 13)) & 0xFFFF) << 16
 
     def write_code(self, address: int, value: int) -> None:
-        """One byte of code memory, which from now on counts as loaded."""
+        """Writes one byte of code memory, which then counts as loaded."""
         self.rom[address] = value
         if address < 2:
             self.rom[0x10000 + address] = value
@@ -310,12 +310,12 @@ class Chip:
         return self.peripherals.interrupts.in_service != 0 or self.cycles - self.blocked <= _ONE_INSTRUCTION
 
     def _block(self) -> None:
-        """No interrupt before one more instruction has been executed: after RETI and writes to IE, IP."""
+        """Blocks interrupts until one more instruction has been executed: after RETI and writes to IE, IP."""
         self.blocked = self.cycles
         self._expect(self.cycles + 1)
 
     def _expect(self, earliest: int) -> None:
-        """What is due next may have changed; nothing that the pins ask for has."""
+        """The next event may have changed, but not the interrupt requests of pins."""
         self.next_event = self.peripherals.next_event(earliest)
         self.limit = 0 if self.stop or self.txd.full else self._next_look()
 

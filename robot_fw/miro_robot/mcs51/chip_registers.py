@@ -36,7 +36,7 @@ _WAITS = (43, 240, 43_769, 22, 120, 21_885, 11, 60, 10_942, 6, 30, 5_741)  # cyc
 
 
 class ChipRegisters:
-    """What an AT89S52 and an STC89C52 have in common. `due_cycle`: the cycle by which the board has to call `due`."""
+    """The common part of an AT89S52 and an STC89C52. `due_cycle`: cycle by which the board must call `due`."""
 
     STATE: dict[str, object] = {
         "auxr": ("i", 0, 0xFF),
@@ -73,7 +73,7 @@ class ChipRegisters:
         self.due_cycle = NEVER_TICK
 
     def begin(self) -> None:
-        """As after power-on."""
+        """Resets to the state after power-on."""
         self.clear()
 
     def read(self, address: int) -> int:
@@ -116,7 +116,7 @@ class ChipRegisters:
         self.plan()
 
     def plan(self) -> None:
-        """Works out `due_cycle`; a run that goes on beyond it ends after this instruction."""
+        """Computes `due_cycle`; a run that continues beyond it ends after this instruction."""
         due = NEVER_TICK
         if self.pause:
             due = self.pause_end
@@ -357,7 +357,7 @@ class Stc89c52Registers(ChipRegisters):
 
 
 def registers_of(chip: str, cpu: Chip) -> ChipRegisters | None:
-    """Those that a chip adds, None where it adds none."""
+    """The additional registers of a chip; None if it has none."""
     if chip == "at89s52":
         return At89s52Registers(cpu)
     return Stc89c52Registers(cpu) if chip == "stc89c52" else None

@@ -51,7 +51,7 @@ class Cpu(Chip):
         return self.run_alone(until_cycle) if self.inspector is None else self.inspector.run(until_cycle)
 
     def run_alone(self, until_cycle: int) -> int:
-        """As `run` without an inspector."""
+        """Like `run`, without an inspector."""
         self.begin_run()
         stopped = self.execute(until_cycle)
         self.end_run()
@@ -65,11 +65,11 @@ class Cpu(Chip):
         return self.execute(until_cycle) if self.inspector is None else self.inspector.run(until_cycle)
 
     def step(self) -> int:
-        """One instruction or interrupt entry; an idle CPU advances by a cycle."""
+        """Executes one instruction or interrupt entry; an idle CPU advances by a cycle."""
         return self.run(self.cycles + 1)
 
     def run_until_any(self, addresses: tuple[int, ...], until_cycle: int) -> int:
-        """Like `run`, but returns BREAKPOINT before the instruction at one of `addresses`; `pc` tells which it was."""
+        """Like `run`, but returns BREAKPOINT before the instruction at one of `addresses`; `pc` is that address."""
         self.mark(addresses)
         try:
             return self.run(until_cycle)
@@ -146,7 +146,7 @@ class Cpu(Chip):
         return 0
 
     def executes_next(self) -> bool:
-        """True if it goes on with the instruction at `pc`: it does not sleep, and no interrupt is entered before."""
+        """True if it continues with the instruction at `pc`: it does not sleep, and no interrupt is entered before."""
         if self.idle or self.powered_down:
             return False
         self.peripherals.sync(self.cycles)
@@ -746,7 +746,7 @@ class Cpu(Chip):
         self.begin_edges()
 
     def begin_edges(self) -> None:
-        """No branch has been taken yet: after the core was put back to another moment."""
+        """Resets the last branch, after the core was restored to another moment."""
         self.edge_before = 0
         self.edge_depth = 0
         self.highest_sp = self.sp

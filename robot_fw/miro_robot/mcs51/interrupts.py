@@ -39,7 +39,7 @@ class Interrupts:
         self.clear()
 
     def clear(self) -> None:
-        """As after reset."""
+        """Resets to the state after reset."""
         self.ie = 0
         self.ip = 0
         self.in_service = 0  # bit 0 a low-priority, bit 1 a high-priority routine
@@ -50,7 +50,7 @@ class Interrupts:
     def ask(self, source: int, cycle: int) -> None:
         """The source's flag is first seen at S5P2 of `cycle`, or before if it is up already.
 
-        The serial port tells of what it sent before it tells of what it received.
+        The serial port reports its transmission before its reception.
         """
         # A flag that is up already keeps its first cycle: set again, it would be latched later than it was.
         if self.until[source] != NEVER_TICK:
@@ -78,7 +78,7 @@ class Interrupts:
         return self.ie if self.ie & 0x80 else 0
 
     def open(self) -> int:
-        """Those of them that what is in service lets interrupt."""
+        """The requests that the interrupts in service allow."""
         if self.in_service & 2:
             return 0
         return self.enabled() & self.ip if self.in_service else self.enabled()

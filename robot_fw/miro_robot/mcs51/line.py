@@ -1,6 +1,6 @@
-"""A wire's level over time: what one chip drove and another one samples.
+"""A wire's level over time: driven by one chip and sampled by another.
 
-What a level means (a UART bit, a strobe) belongs to the chips at both ends.
+The chips at both ends interpret the levels (a UART bit, a strobe).
 
 A Line has one producer, which appends edges in order and says up to where its content is final, and consumers
 that never look beyond that tick. Edges live in a ring; the consumer forgets what is no longer needed. A line
@@ -162,7 +162,7 @@ class Line:
         self.full = self._end - self._heard > _WAITING and not self.unread
 
     def full_tick(self) -> int:
-        """Tick of the 2048th edge that waits to be heard, NEVER_TICK if there are not so many."""
+        """Tick of the 2048th edge that waits for its consumer; NEVER_TICK if there are fewer."""
         if self._end - self._heard < _WAITING:
             return NEVER_TICK
         return self._ticks[(self._heard + _WAITING - 1) & self._mask]

@@ -172,7 +172,7 @@ TABLE: tuple[tuple[int, int, int, str, str, int, int], ...] = (
 
 
 def _by_opcode(column: int) -> bytes:
-    """One column of the table, spread over the 256 opcodes."""
+    """One column of the table, expanded to the 256 opcodes."""
     spread = bytearray(256)
     for row in TABLE:
         first, count, step = row[:3]
@@ -227,7 +227,7 @@ def is_conditional(opcode: int) -> bool:
 
 
 def target(code: bytes, address: int) -> int | None:
-    """Where the LCALL, ACALL, LJMP or AJMP at `address` goes; None if that is another instruction."""
+    """Target of the LCALL, ACALL, LJMP or AJMP at `address`; None for another instruction."""
     opcode, first, second = (code[(address + offset) & 0xFFFF] for offset in range(3))
     return _absolute(opcode, first, second, address)
 

@@ -127,7 +127,7 @@ class Peripherals:
     # Time
 
     def look_again(self) -> None:
-        """What timers and serial port wait for has to be worked out (-1)."""
+        """The next events of timers and serial port must be recomputed (-1)."""
         self.timer_wait = -1  # cycle up to which timers 0 and 1 raise no flag
         self.serial_wait = -1  # tick before which the serial port raises no flag
         self.quiet = -1  # cycle up to which nothing is due
@@ -164,7 +164,7 @@ class Peripherals:
             self.quiet = min(self.serial_wait // 12, self.timer_wait, self.ports.next_cycle)
 
     def settle(self, cycle: int) -> None:
-        """As `sync`, and brings timers and serial port up to there."""
+        """Like `sync`, and also advances timers and serial port to `cycle`."""
         self.sync(cycle)
         if not self.frozen and not self.pulsed:
             self.timers.sync(self.now)
@@ -197,7 +197,7 @@ class Peripherals:
         self.look_again()
 
     def _pulse(self, timer1: int, timer2: int, cycle: int) -> None:
-        """One overflow of timer 1 and/or timer 2 in `cycle`."""
+        """Delivers one overflow of timer 1 and/or timer 2 in `cycle`."""
         # SMOD = 0 halves timer 1: every second overflow since the reset is a tick (U1).
         halved = timer1 and not self.smod and self.timers.overflows1 & 1
         ticks1 = 1 if timer1 and not halved else 0
@@ -273,7 +273,7 @@ class Peripherals:
         )
 
     def _note_clocks(self, mode: int) -> None:
-        """What clocks the serial port: in modes 1 and 3 timers, of which one may count a pin."""
+        """Sets the clock of the serial port: in modes 1 and 3 a timer, which may count a pin."""
         both = _RCLK | _TCLK
         self.timer1_free = 1 if self.timer2.control & both == both and mode & 1 else 0
         self.pulsed = self.timers.counts_pin(1) | self.timer2.counts_pin() if mode & 1 else 0
@@ -425,7 +425,7 @@ class Peripherals:
         return self.bus.extra_read(address)
 
     def write_bit(self, address: int, mask: int, level: int, cycle: int) -> int:
-        """As `write`, of one bit; the others keep what hardware has set meanwhile."""
+        """Like `write`, for one bit; the others keep values that hardware has set meanwhile."""
         self.sync(cycle)
         timers = address == _TCON  # what programs do most
         value = self.timers.control | self.external.control if timers else self.read(address, cycle)

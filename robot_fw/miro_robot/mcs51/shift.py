@@ -62,7 +62,7 @@ class Shift:
                 self._bit(12 * self.cycle)
 
     def _bit(self, tick: int) -> None:
-        """One bit cycle that begins at `tick`."""
+        """Runs one bit cycle that begins at `tick`."""
         uart = self.uart
         if self.flag == _TI:
             self.data.append(tick, (self.value >> self.number) & 1)
@@ -117,6 +117,6 @@ class Shift:
         return 12 * (self.cycle + 8 - self.number) if self.flag else NEVER_TICK
 
     def check_times(self, cycle: int) -> None:
-        """Raises ValueError unless the register goes on at `cycle`."""
+        """Raises ValueError unless the register continues at `cycle`."""
         if (self.flag and not cycle <= self.cycle <= cycle + 2) or self.data.last_tick() > 12 * cycle:
             raise ValueError(f"the shift register is not at cycle {cycle}")

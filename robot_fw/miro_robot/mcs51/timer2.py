@@ -49,7 +49,7 @@ class Timer2:
         self.clear(0)
 
     def clear(self, cycle: int) -> None:
-        """As after reset in `cycle`."""
+        """Resets to the state after reset in `cycle`."""
         self.control = 0  # T2CON
         self.t2mod = 0
         self.count = 0

@@ -57,7 +57,7 @@ class Timers:
         self.clear(0)
 
     def clear(self, cycle: int) -> None:
-        """As after reset in `cycle`."""
+        """Resets to the state after reset in `cycle`."""
         self.control = 0  # TCON.7:4 = TF1 TR1 TF0 TR0, in place
         self.synced = cycle  # everything below this cycle is done
         self.overflows1 = 0  # of timer 1 since reset: the serial port halves them

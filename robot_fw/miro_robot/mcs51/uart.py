@@ -39,7 +39,7 @@ _LAST_ACTION = _LAST_BIT * _ROLLOVERS + _ACTION  # 16x ticks from the fall to th
 
 
 def _flag_tick(tick: int) -> int:
-    """When RI shows that the last vote was taken at `tick`: with the next S3P1 (U6)."""
+    """Tick at which RI shows that the last vote was taken at `tick`: the next S3P1 (U6)."""
     return (tick + 7) // 12 * 12 + 4
 
 
@@ -95,7 +95,7 @@ class Uart:
         self.clear(0)
 
     def clear(self, cycle: int) -> None:
-        """As after reset in `cycle`: registers and both state machines; SBUF is left as it was."""
+        """Resets registers and both state machines to the state after reset in `cycle`; SBUF stays unchanged."""
         self.scon = 0
         self.tx_phase = 0  # 16x ticks since the last rollover
         self.abort(12 * cycle)
@@ -127,7 +127,7 @@ class Uart:
         self._receive(tick)
 
     def pulse(self, rx: int, tx: int, tick: int) -> None:
-        """One 16x tick for either direction, from a clock that has no regular ones."""
+        """Processes one 16x tick for either direction, from an irregular clock."""
         if rx:
             self.rx_next = tick
         if tx:
@@ -209,7 +209,7 @@ class Uart:
             self.tx_phase = (self.tx_phase + passed) & _COUNTER_BITS
 
     def _edge(self) -> None:
-        """One bit appears on TXD; with the stop bit comes TI."""
+        """Puts one bit on TXD; the stop bit sets TI."""
         self.tx_level = self.tx_coming
         self.txd.append(self.tx_edge, self.tx_level & (self.latch >> 1))
         if self.tx_left == 0:
@@ -224,7 +224,7 @@ class Uart:
         return self._first_bit() + (self.tx_left - 1) * _ROLLOVERS * self.tx_period
 
     def tx_at(self, tick: int) -> int:
-        """What the transmitter puts on TXD at `tick`, if nothing changes until then; not before what is done."""
+        """The transmitter's level on TXD at `tick`, if nothing changes until then; not for ticks in the past."""
         level = self.tx_coming if self.tx_edge <= tick else self.tx_level
         edge = self._first_bit()
         for number in range(self.tx_left):
@@ -247,7 +247,7 @@ class Uart:
         return NEVER_TICK
 
     def _first_bit(self) -> int:
-        """When the next bit appears that has no rollover yet."""
+        """Tick of the next bit that has no rollover yet."""
         rollover = self.tx_next + (_ROLLOVERS - 1 - self.tx_phase) * self.tx_period
         return rollover + (self.tx_delay if self.tx_delay else 12 - rollover % 12)
 
@@ -408,7 +408,7 @@ class Uart:
         return self.ri_tick()
 
     def check_times(self, tick: int) -> None:
-        """Raises ValueError unless the port goes on at `tick`: what it sends comes after the edges on TXD."""
+        """Raises ValueError unless the port continues at `tick`: what it sends comes after the edges on TXD."""
         if self.txd.last_tick() > tick or self.tx_edge < tick or self.tx_next < tick:
             raise ValueError(f"the serial port has edges of TXD out of order at tick {tick}")
         if self.rx_next < tick:

@@ -6,7 +6,7 @@ from miro_robot.mcs51.bus import Bus
 
 
 class XramBus(Bus):
-    """Whose characters and faults nobody hears of."""
+    """A bus that ignores characters and faults."""
 
     HAS_XRAM = True
     STATE = {"memory": "65536B"}

@@ -97,7 +97,7 @@ class DhtPart(Part):
         self.answers = self.refused = self.broken = 0
 
     def start(self, tick: int) -> None:
-        """It measures for the first time when `ready_tick` comes."""
+        """Starts the sensor; the first measurement is at `ready_tick`."""
         self.step = 0
         self.fall_tick = tick
         self.next_tick = self.ready_tick = tick + self.ticks(_BEGIN_US)
@@ -144,7 +144,7 @@ class DhtPart(Part):
         self.bits = humidity << 24 | degrees << 8 | check
 
     def put(self, name: str, value: Any, tick: int) -> None:
-        """What it is like there is measured later; one that was missing begins as after power-on."""
+        """Sets the climate, which is measured later; a sensor that was missing starts as after power-on."""
         if name != "broken":
             setattr(self, name, value)
             return

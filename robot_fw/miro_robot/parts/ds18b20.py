@@ -79,7 +79,7 @@ class Ds18b20(PartKeys, frozen=True, kw_only=True, tag="ds18b20"):
 
 
 def _bytes_of(text: str, count: int, key: str) -> bytes:
-    """Raises ValueError for anything but so many bytes in hex digits."""
+    """Parses `count` bytes in hex digits; raises ValueError for any other text."""
     digits = text.strip().lower()
     if len(digits) != 2 * count or digits.strip("0123456789abcdef"):
         raise ValueError(f"{key} is {text!r}, not {2 * count} hex digits")
@@ -148,7 +148,7 @@ class Ds18b20Part(Part):
         self.drive(0, LOW if self.broken == _SHORT else RELEASED)
 
     def _lose(self) -> None:
-        """As after power-on."""
+        """Resets to the state after power-on."""
         self.phase = _IDLE
         self._recall()
         self.raw = _NOT_CONVERTED
@@ -209,7 +209,7 @@ class Ds18b20Part(Part):
         return int(self.rom[number >> 3 & 7]) >> (number & 7) & 1
 
     def _bit(self, tick: int) -> int:
-        """What it sends in this slot."""
+        """The bit that it sends in this slot."""
         if self.phase == _SEARCH:
             return self._rom_bit(self.done // 3) ^ self.done % 3
         if self.phase == _READ_ROM:

@@ -135,7 +135,7 @@ class HcSr04Part(Part):
         return self.distance_cm
 
     def _echo_us(self, cm: float) -> float:
-        """How long this answer is."""
+        """Length of this answer in microseconds."""
         if self.echo == _NONE or cm > _FARTHEST_CM:
             return 0.0 if self.is_silent else _NO_ECHO_US
         if self.noise_cm > 0.0:
@@ -162,7 +162,7 @@ class HcSr04Part(Part):
 
 
 class HcSr04OnCar(HcSr04Part):
-    """One that stands on a car. `sees_walls`: and measures, until a distance is put."""
+    """A ranger on a car. `sees_walls`: it measures the walls until a distance is put."""
 
     STATE = {"sees_walls": FLAG}
     NOT_STATE = ("car", "servo", "ahead_cm", "left_cm", "turned_deg")

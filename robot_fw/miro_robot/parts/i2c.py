@@ -55,7 +55,7 @@ class I2cTarget(Part):
     }
     NOT_STATE: tuple[str, ...] = ("low_ticks", "high_ticks")
     LEAST_LOW_NS, LEAST_HIGH_NS = 1300, 600
-    """Of SCL: those of the fast mode, 400 kHz (UM10204, table 10)."""
+    """Shortest low and high time of SCL: those of the fast mode, 400 kHz (UM10204, table 10)."""
 
     def __init__(self, keys: PartKeys, place: Place) -> None:
         Part.__init__(self, keys, place)

@@ -15,7 +15,7 @@ IN, STRONG, OPEN_DRAIN, TWO_WAY = range(4)
 drives both levels or lets go, and is an input, too: a data bus.
 """
 LOW, HIGH, RELEASED = 0, 1, 2
-"""What a part drives a pin with. A pin that was let go, of a driver that lets go, drives nothing."""
+"""Drives of a pin by a part. RELEASED: the driver has let go and drives nothing."""
 MOST_PINS = 32
 """A part has 30 at most."""
 
@@ -30,7 +30,8 @@ class Pin(NamedTuple):
 
 
 class Place(msgspec.Struct, frozen=True):
-    """Where a part is soldered: its name on the board, the crystal, its noise, and who shares the nets of its pins.
+    """The place of a part on the board: its name, the crystal, its noise, and the parts that share the nets of its
+    pins.
 
     `at_cpu`: pins on a net with a port pin, or that a MOVX reads. `peers`: by pin, the other parts on its net with the
     index of their pin; parts that are made later are put in before `start`.
@@ -68,7 +69,7 @@ class PartKeys(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_only=
 
     @property
     def pulled_up(self) -> tuple[str, ...]:
-        """Pins that the part itself brings to VCC, as by a resistor: nobody else need drive them high."""
+        """Pins that the part itself pulls up to VCC with a resistor, so nothing else needs to drive them high."""
         return ()
 
     @property

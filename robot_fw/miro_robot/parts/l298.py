@@ -73,7 +73,7 @@ class L293d(L298, frozen=True, kw_only=True, tag="l293d"):
 
 
 class Channel:
-    """What one channel drives, and the share of a PWM period in which it did.
+    """The output of one channel, and its duty in a PWM period.
 
     `direction`: 1 forward, -1 backward, 0 neither, since `edge_tick`. `driven_ticks`: forward less backward up to then.
     `begun_ticks`, `begun_driven`: when it last began to drive backward, and forward, and `driven_ticks` then; -1: not

@@ -27,7 +27,7 @@ from miro_robot.parts.keys import IN, LOW, RELEASED, STRONG, TWO_WAY, PartKeys, 
 from miro_robot.parts.part import Part
 
 CRYSTAL_HZ = 24_000_000
-"""Of the board: the chip's time is counted in its ticks."""
+"""Crystal of the board: the chip's time is counted in its ticks."""
 _PS, _RD, _WR, _CS, _RST, _HI, _MAG, _SIGN, _A, _B, _IN = range(8, 19)
 _BUS, _PHASES, _INDEX = 0x1FFF, 3 << _A, 1 << _IN  # as bits
 _STROBES, _READS = 0x0E00, 0x0400  # /RD /WR /CS; as they are while the chip is read
@@ -174,7 +174,7 @@ class Lm629Part(Part):
         return lows
 
     def _watch_others(self) -> None:
-        """Of chips that share the bus one may be read at a time. Where more begins, it is one fault."""
+        """Detects two chips read at a time on a shared bus. Several overlaps at once are one fault."""
         reading = 1 if self.levels & _STROBES == _READS else 0
         for other in self.others_on_bus:
             if other.levels & _STROBES == _READS:

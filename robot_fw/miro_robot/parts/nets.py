@@ -216,7 +216,7 @@ class Nets:
             self.kin_first[index + 1] = end
 
     def _reaching(self, netlist: Netlist) -> list[int]:
-        """Parts whose events may come to a port pin, an input buffer, or a second output, by way of others, too."""
+        """Parts whose events may reach a port pin, an input buffer, or a second output, also through other parts."""
         nets = {net for net in netlist.ports if net >= 0}
         nets.update(net for buffer in netlist.buffers for net in buffer)
         nets.update(net for net in range(self.count) if self._may_contend(net, netlist))
@@ -491,7 +491,7 @@ class Nets:
         self.called = -1
 
     def _after(self, index: int, part: Part, tick: int) -> None:
-        """What the part that was called has set, and what it has set of others."""
+        """Applies the changes of the part that was called, and its changes of other parts."""
         if part.next_tick <= tick:
             self._check_next(part, tick)
         if part.moved & self.cpu_pins[index] and self.called_why != _CHANGED:
@@ -508,9 +508,9 @@ class Nets:
             raise PluginError(reason, "set next_tick beyond the tick of the call")
 
     def _check_reach(self, part: Part, tick: int) -> None:
-        """What a part does by itself must not come to the CPU before the tick that it has given.
+        """Checks that a part's own event does not reach the CPU before the tick that it announced.
 
-        By way of other parts it is these that have given one.
+        Events through other parts are covered by those parts' announcements.
         """
         reach_tick = self.reach_ticks[self.called]
         if tick < reach_tick < _NEVER and self.called_why in (_DUE, _ADVANCE):
@@ -543,7 +543,7 @@ class Nets:
                 self.reach_tick = min(self.reach_tick, reach_tick)
 
     def _take_effect(self) -> None:
-        """What the parts of the last wave drive, all at once."""
+        """Applies all drives of the last wave at once."""
         for place in range(self.moving_count):
             index = self.moving[place]
             self.is_moving[index] = 0
@@ -627,7 +627,7 @@ class Nets:
             self._mark_pin(place)
 
     def _mark_pin(self, place: int) -> None:
-        """A part is to be called for one of its pins; without supply only a continuous part is."""
+        """Schedules a call of a part for one of its pins; without supply only of a continuous part."""
         index = self.pin_part[place]
         part = self.parts[index]
         if self.powered or part.continuous:
@@ -662,7 +662,7 @@ class Nets:
     # Ports
 
     def _show_ports(self, net: int) -> None:
-        """What the outside puts on the port pins of a net: its level without the pin's own drive, or short."""
+        """Updates the outside level of the port pins on a net: its level without the pin's own drive, or a short."""
         number = self.port_of[net]
         while number >= 0:
             port = number >> 3
@@ -680,7 +680,7 @@ class Nets:
     # What is wrong
 
     def drivers(self, net: int) -> list[str]:
-        """Who drives a net strongly, by name."""
+        """Names of the strong drivers of a net."""
         there = [
             port_pin(number)
             for number in range(PORT_PINS)
@@ -696,7 +696,7 @@ class Nets:
         return there
 
     def _explained(self, error: BaseException, tick: int) -> PluginError:
-        """What the part that is being called did wrong, with its name, its pins and the tick."""
+        """The error of the part being called, with its name, its pins and the tick."""
         index = self.called
         self.called = -1
         place = self._place(index, self.called_pins if self.called_why != _OTHER else 0, tick)

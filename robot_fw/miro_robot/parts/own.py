@@ -1,4 +1,4 @@
-"""What is checked of a part that somebody else may have written: that it is one, and that it keeps what STATE says."""
+"""Checks of a part that may come from another author: its type, and that it keeps to its STATE."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ _CODES = 'of a number it is "q" (whole), "d", or one of these with limits: ("d",
 
 
 def check_made(made: Any, keys: PartKeys, place: Place) -> Part:
-    """What `make` returned, which has to be a new part with these keys at this place. Raises PluginError."""
+    """Checks the result of `make`: a new part with these keys at this place. Raises PluginError."""
     who = f"part {place.name!r} ({keys.name}): `make` returned"
     if not isinstance(made, Part):
         raise PluginError(f"{who} {made!r:.40}", "return a Part, as return FanPart(self, place)")
@@ -25,7 +25,7 @@ def check_made(made: Any, keys: PartKeys, place: Place) -> Part:
 
 
 def check_state(part: Part, tick: int) -> None:
-    """That all its attributes are declared, and are what STATE says. Raises PluginError."""
+    """Checks that all attributes of the part are declared, with values as in STATE. Raises PluginError."""
     try:
         _check(part)
     except Exception as error:

@@ -1,4 +1,4 @@
-"""What a part of a board is: its keys, its pins, what a test may put and read, and how it behaves.
+"""The interface of a board's parts: keys, pins, values that a test may put and read, and behaviour.
 
 A part is two classes in one file. `PartKeys` is the table of the board file: a frozen struct whose tag is the part's
 name, with its pins, its values and its sheet as class variables; `make` gives the `Part`, which behaves.
@@ -147,7 +147,7 @@ class Part:
         self.next_tick = _NEVER
 
     def advance(self, tick: int) -> None:
-        """Of a continuous part: moves on to `tick`, before a part that is wired to it has an event there."""
+        """Advances a continuous part to `tick`, before a part that is wired to it has an event there."""
 
     def put(self, name: str, value: Any, tick: int) -> None:
         """A test puts `value`, of the type in `PUTS`, at `tick`."""

@@ -1,4 +1,4 @@
-"""Who shares a net with whom, from the words of a board file.
+"""Resolves the nets of a board file: the pins that share each net.
 
     "P1.0" a port pin · "SDA" a net · "bridge.out1" another part's pin · "CTRL.3" a bit of an output latch
     "0", "1" ground and VCC · "!.." the same behind an inverter
@@ -23,7 +23,7 @@ MOST_LATCHES = MOST_BUFFERS = 8
 GROUND, VCC = "0", "1"
 _SUPPLIES = {"GND": GROUND, "GROUND": GROUND, "VSS": GROUND, "VCC": VCC, "VDD": VCC}
 LONGEST_WAY = 64
-"""From a pin to its net: so many pins."""
+"""Largest number of pins between a pin and its net."""
 NAME = re.compile(r"[A-Za-z_]\w{0,63}", re.ASCII)
 _PORT_PIN = re.compile(r"P[0-3]\.[0-7]")
 _PORT = re.compile(r"P[0-9]")
@@ -37,7 +37,7 @@ class BoardError(BadInput):
 
 
 class _Wire(msgspec.Struct):
-    """Who is on a net. `pins`: part, number of its pin, and whether it is behind an inverter."""
+    """The pins on a net. `pins`: part, number of its pin, and True if it is behind an inverter."""
 
     ports: list[int] = []
     pins: list[tuple[str, int, bool]] = []
@@ -147,7 +147,7 @@ class _Resolver:
         self.allow_contention(spec.allow_contention)
 
     def check_pins(self, name: str, part: PartSpec) -> None:
-        """That every pin that needs it is connected, and no other is named."""
+        """Checks that every pin that needs it is connected, and that no unknown pin is named."""
         numbers = self.numbers[name]
         for pin in part.pins:
             if pin not in numbers:
@@ -167,7 +167,7 @@ class _Resolver:
                 )
 
     def target(self, text: str, place: str, way: tuple[tuple[str, str], ...] = ()) -> tuple[str, bool]:
-        """The name of the net that a word of the file leads to, and whether by an inverter. `way`: the pins so far."""
+        """The name of the net for a word of the file, and True if it is inverted. `way`: the pins so far."""
         inverted = text.startswith("!")
         word = text.removeprefix("!")
         owner, dot, pin = word.partition(".")
@@ -210,7 +210,7 @@ class _Resolver:
     def pin_of_part(
         self, owner: str, pin: str, place: str, way: tuple[tuple[str, str], ...]
     ) -> tuple[str, bool]:
-        """Where a pin of another part leads; a pin that nothing else is said of is a net by itself."""
+        """The net of another part's pin; a pin without an entry is a net of its own."""
         if owner not in self.spec.parts:
             if _LIKE_A_PORT.fullmatch(owner):
                 raise BoardError("", place, f"there is no port pin {f'{owner}.{pin}'!r}", "use P0.0 to P3.7")
@@ -253,7 +253,7 @@ class _Resolver:
         return self.wires[net]
 
     def check_serial(self, name: str, pin: str, net: str, inverted: bool) -> None:
-        """That a part of the serial line is at the serial port, and the only one there."""
+        """Checks that a part of the serial line is at the serial port, and the only one there."""
         port = self.spec.parts[name].keys.AT.get(pin)
         if port is None:
             return
@@ -345,7 +345,7 @@ class _Resolver:
                 raise BoardError("", self.place_of(part, number), problem, "leave the pin out, or name a net")
 
     def check_high(self, name: str, wire: _Wire) -> None:
-        """That who listens to the net can find it high: P0 and open-drain pins cannot do that."""
+        """Checks that a listener on the net can read high: P0 and open-drain pins cannot drive it."""
         if wire.strap or wire.pulled_up or wire.latches or any(number >= 8 for number in wire.ports):
             return
         # What P0 says to a two-way pin must come there, so the other two-way pins are of no help beside P0.
@@ -362,7 +362,7 @@ class _Resolver:
             raise BoardError("", place, problem, f'add pull_ups = ["{name}"], or "{name}" to it')
 
     def check_low(self, name: str, wire: _Wire) -> None:
-        """That a contact to VCC does something at the processor, which reads a net that nothing drives as high."""
+        """Checks that a contact to VCC has an effect at the processor, which reads an undriven net as high."""
         if wire.strap or wire.pulled_down or wire.latches or not (wire.ports or wire.buffers):
             return
         outputs = [pin for pin in wire.pins if self.kind(*pin[:2]) != IN]

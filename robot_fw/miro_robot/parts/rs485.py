@@ -97,18 +97,18 @@ class Rs485Part(WirePart):
     # Several boards
 
     def join(self, names: list[str], slot: int, delay_ticks: int) -> None:
-        """It is on a bus of boards with these `names`, as that in `slot`."""
+        """Joins a bus of boards with these `names`, as the one in `slot`."""
         self.names, self.slot, self.delay_ticks = names, slot, delay_ticks
         self.switched = [(0, self.driving)] if self.driving else []
 
     def take(self, end_tick: int) -> list[tuple[int, int]]:
-        """When its driver went on or off before `end_tick`, once."""
+        """Ticks at which its driver went on or off before `end_tick`; each is returned once."""
         taken = [change for change in self.switched if change[0] < end_tick]
         self.switched = self.switched[len(taken) :]
         return taken
 
     def meet(self, tick: int, other: int) -> None:
-        """At `tick` it gets known that the driver of the board in slot `other` was on as this one went on."""
+        """Reports at `tick` that the driver of the board in slot `other` was on when this one went on."""
         self.meetings.append((tick, other))
         self.next_tick = self.meetings[0][0]
 

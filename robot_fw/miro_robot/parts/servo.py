@@ -20,7 +20,9 @@ from miro_robot.parts.part import Part
 
 _SHORTEST_US, _LONGEST_US = 300.0, 3000.0  # what else comes is no pulse for a servo: chosen
 _HOLD_US = 50_000.0
-"""So long after a pulse an analog servo drives its motor; then it stands, limp, until the next one comes."""
+"""Time in microseconds for which an analog servo drives its motor after a pulse; then it stands without torque until
+the next.
+"""
 
 
 class Servo(PartKeys, frozen=True, kw_only=True, tag="servo"):
@@ -111,7 +113,7 @@ class ServoPart(Part):
                 self._aim(tick)
 
     def turned_deg(self, tick: int) -> float:
-        """How far its horn is from the middle, counter-clockwise, seen from above."""
+        """Angle of the horn from the middle, counter-clockwise from above, in degrees."""
         return self.way * (self._angle(tick) - 0.5 * self.range_deg)
 
     def _aim(self, tick: int) -> None:
@@ -121,7 +123,7 @@ class ServoPart(Part):
         self.target_deg = min(max((us - self.low_us) * self.deg_per_us, 0.0), self.range_deg)
 
     def _angle(self, tick: int) -> float:
-        """Where it is at `tick`, which is not before `from_tick`."""
+        """Its angle at `tick`, which must not be before `from_tick`."""
         reach = self.deg_per_tick * min(tick - self.from_tick, self.hold_ticks)
         if self.target_deg >= self.angle_deg:
             return min(self.angle_deg + reach, self.target_deg)

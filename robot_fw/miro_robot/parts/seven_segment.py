@@ -105,13 +105,13 @@ class SevenSegmentPart(Part):
         self._look()
 
     def _look(self) -> None:
-        """What is lit from now on."""
+        """Samples the lit segments from now on."""
         on = (self.levels ^ self.turned) & self.there
         self.segments = on & 0xFF
         self.digits = on >> 8 & 0xFF if self.there >> 8 else 1
 
     def _gather(self, tick: int) -> None:
-        """What was lit up to now."""
+        """Adds the lit segments up to now."""
         since = tick - self.last_tick
         self.last_tick = tick
         if not self.segments:

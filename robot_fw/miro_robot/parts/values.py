@@ -75,7 +75,7 @@ def _known(path: str, key: str, keys: Sequence[str], reason: str) -> str:
 
 
 def _takes(kind: Any) -> str:
-    """What a key takes, where that is one of a few words."""
+    """Text about the possible words of a key, if there are few."""
     info = msgspec.inspect.type_info(kind)
     options = info.types if isinstance(info, msgspec.inspect.UnionType) else (info,)
     literals = [literal for literal in options if isinstance(literal, msgspec.inspect.LiteralType)]

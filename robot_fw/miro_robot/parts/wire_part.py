@@ -33,7 +33,7 @@ class WirePart(Part):
         raise NotImplementedError
 
     def takes(self, first_tick: int, end_tick: int, characters: int) -> bool:
-        """True if so many of the host come to the processor, from `first_tick` on; asked before that.
+        """True if `characters` of the host reach the processor, from `first_tick` on; called before that.
 
         `end_tick`: the begin of the last stop bit, which idle lines hold as well.
         """

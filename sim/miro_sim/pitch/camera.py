@@ -188,7 +188,7 @@ class Camera:
         self.robots = body + 1
 
     def _turn(self, place: int, x: int, y: int) -> None:
-        """What a way is in the axes of a robot at an instant."""
+        """Transforms a way into the axes of a robot at an instant."""
         self.fall_u = (x * self.cos[place] + y * self.sin[place]) >> 15
         self.fall_v = (y * self.cos[place] - x * self.sin[place]) >> 15
 
@@ -210,7 +210,7 @@ class Camera:
         self.edges[at + 4 * _NEAR + 1] = _HALF_UM if least < margin else _FAR_UM
 
     def _bound(self, body: int) -> None:
-        """How far, at most, a place of the robot is at any instant from where it is at the middle one."""
+        """Largest distance of any place of the robot, at any instant, from its position at the middle instant."""
         middle = body * _SETS + self.sets // 2
         reach = 12 * body + 4 * _REACH
         length = self.edges[reach + _HIGH_U] - self.edges[reach + _LOW_U]
@@ -250,7 +250,7 @@ class Camera:
         return out
 
     def _put_robots(self, row: int, at: int) -> None:
-        """Those pixels of a line in which a robot may be seen; `at`: where column 0 would be in the bands."""
+        """Draws the pixels of a line in which a robot may be seen; `at`: index of column 0 in the bands."""
         for column in range(self.covered_first[self.place], self.covered_end[self.place]):
             if self.covered[at + column]:
                 if self.covered[at + column] == _UNSURE:
@@ -328,7 +328,7 @@ class Camera:
         self.span_end = right if left < right else 0
 
     def _beside(self, body: int, pixel: int) -> int:
-        """How far the samples of a pixel stay beside all that is seen of a robot; 0 or less where they may meet it."""
+        """Distance of a pixel's samples from everything seen of a robot; 0 or less if they may meet it."""
         place = body * _SETS + self.sets // 2
         reach = 12 * body + 4 * _REACH
         self._turn(
@@ -440,7 +440,7 @@ class Camera:
         self.total[index] = total
 
     def _within(self, row: int, column: int, box: int) -> int:
-        """How many samples of all instants lie in a rectangle."""
+        """Number of samples, over all instants, in a rectangle."""
         at = 4 * box
         if self._inside(at):
             return 16 * self.field_sets
@@ -460,7 +460,7 @@ class Camera:
     def _count(
         self, row: int, column: int, first: int, end: int, low_u: int, high_u: int, low_v: int, high_v: int
     ) -> int:
-        """How many of these samples lie in a rectangle: compared along the axes where edges are crossed."""
+        """Number of these samples in a rectangle: compared along the axes where edges are crossed."""
         across_u = self.least_u <= low_u or self.most_u > high_u
         across_v = self.least_v <= low_v or self.most_v > high_v
         if not (across_u or across_v):
@@ -484,7 +484,7 @@ class Camera:
         return within[0] + within[1] + within[2] + within[3]
 
     def _spread(self, row: int, column: int, axis: int) -> None:
-        """Where the samples of a pixel lie at all instants, line by line: between its corners, as in the scene."""
+        """Positions of a pixel's samples at all instants, line by line: between its corners, as in the scene."""
         pixel = row * _WIDTH + column
         if self.spread[axis] == pixel:
             return
@@ -507,7 +507,7 @@ class Camera:
                     at[lane] += 2 * by[lane]
 
     def _entered(self, body: int, row: int, column: int, on_top: int) -> int:
-        """How many samples of all instants see any of a robot, `on_top` of them its top."""
+        """Number of samples, over all instants, that see any of a robot, `on_top` of them its top."""
         if self._inside(12 * body + 4 * _NEAR):
             return on_top
         if self._inside(12 * body + 4 * _BASE):
@@ -520,7 +520,9 @@ class Camera:
         return entered * self.times
 
     def _enter(self, row: int, column: int, number: int) -> int:
-        """How many samples of an instant see any of a robot: one by one where some may pass its square by a corner."""
+        """Number of an instant's samples that see any of a robot: one by one where some may pass its square by a
+        corner.
+        """
         fall_u, fall_v = self.fall_u, self.fall_v
         upper = number * _LINES + (row & 1) * _LINE + column
         lower = number * _LINES + (~row & 1) * _LINE + column
@@ -546,7 +548,7 @@ class Camera:
         return entered
 
     def _across(self, corner: int) -> int:
-        """How far the ray of a corner passes the middle of a robot, times how far it falls."""
+        """Distance of a corner's ray from the middle of a robot, times the ray's fall."""
         return self.corner[corner] * self.fall_v - self.corner[_AXIS + corner] * self.fall_u
 
     # ---- several robots, or much in the background
@@ -588,7 +590,7 @@ class Camera:
         return total
 
     def _see(self, body: int, number: int, pixel: int) -> None:
-        """What the samples of an instant see of one robot, where it is higher than what they have seen."""
+        """Updates an instant's samples with one robot, where it is higher than what they have seen."""
         self._turn(body * _SETS + number, self.rays.fall_x[pixel], self.rays.fall_y[pixel])
         for at in range(number * self.samples, (number + 1) * self.samples):
             u, v = self.place_of[at], self.place_of[_SAMPLES + at]

@@ -57,5 +57,5 @@ def _pixels(camera: Camera, at: tuple[float, float, float]) -> list[tuple[int, i
 def colours_of(
     lens: CameraParameters, picture: PictureSettings, pattern: PatternName, ball: bool = True
 ) -> ColourClasses:
-    """The classes that such samples give. Raises EyeError for colours that cannot be told apart."""
+    """The classes from such samples. Raises EyeError for colours that cannot be distinguished."""
     return classes_of(samples_of(lens, picture, pattern, ball), "camera.picture")

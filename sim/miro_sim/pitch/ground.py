@@ -28,7 +28,7 @@ ROBOT_HALF_M = 0.0375
 
 
 def reach_m(theta_rad: float) -> float:
-    """How far the robot's square at this heading reaches from its centre along x, and as far along y.
+    """Extent of the robot's square at this heading from its centre along x, which is the same along y, in metres.
 
     A corner is half an edge ahead and half an edge aside: the largest of |+-cos +- sin| half edges.
     """

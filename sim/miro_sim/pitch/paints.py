@@ -33,7 +33,10 @@ NUMBERS = {name: number for number, name in enumerate(PAINTS)}
 """A paint's number: pixels are made of numbers."""
 
 BITS = 21
-"""Of one colour in a packed paint: red in the lowest bits, then green, then blue. Up to 512 paints can be added."""
+"""Bits of one colour in a packed paint: red in the lowest bits, then green, then blue.
+
+Up to 512 paints can be added.
+"""
 FULL = 4095
 
 

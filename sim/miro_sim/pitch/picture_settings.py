@@ -1,4 +1,4 @@
-"""What a camera makes of light, apart from its geometry: exposure, brightness, the television signal, noise."""
+"""The camera's processing of light, apart from its geometry: exposure, brightness, the television signal, noise."""
 
 from typing import Annotated, Literal
 

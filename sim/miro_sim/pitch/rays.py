@@ -1,4 +1,4 @@
-"""Where the corners of all pixels look, in integers: the camera's geometry, worked out once.
+"""The rays of all pixel corners, in integers: the camera's geometry, computed once.
 
        camera                        corner (i, j) of pixel (i, j), 321 x 241 of them
          /\\                          slope: how far a ray goes for each unit that it falls, times 2^22

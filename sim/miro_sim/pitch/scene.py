@@ -1,4 +1,4 @@
-"""What stands still while the camera looks: floor, lines, goals, walls and the ball.
+"""The static scene of the camera: floor, lines, goals, walls and the ball.
 
         +---------[ 40 cm goal is 15 cm deep ]--+
         |/ 7 cm              |                 \\|      walls 5 cm high, 2.5 cm wide, white inside, black on top
@@ -255,7 +255,7 @@ class Scene:
 
 
 def _copy(kept: array[int], pixel: int, line: list[int], column: int, count: int) -> None:
-    """Copies so many values into a line, and a few more."""
+    """Copies `count` values into a line, and a few more."""
     values = [0] * 16
     for at in range(0, count, 16):
         for lane in range(16):

@@ -110,7 +110,7 @@ class Sensor:
         return f"Sensor({self.settings!r}, {self.stream!r}, frame={self.frame})"
 
     def begin(self, frame: int, tick: int, samples: int) -> None:
-        """A new frame, whose exposure has its middle at `tick`; a pixel is a sum of so many samples."""
+        """Begins a new frame with the middle of its exposure at `tick`; a pixel is a sum of `samples` samples."""
         self.frame = frame
         self.scale = math.floor(self.settings.gain * self._lamps(tick) / samples * 16777216.0 + 0.5)
 

@@ -150,11 +150,10 @@ class Band:
         self.change_tick = change + self.latency
 
     def hear(self, tick: int) -> None:
-        """The receiver has come to `tick`: drops edges from the robots' wires that no later query needs.
+        """The receiver has reached `tick`: drops edges from the robots' wires that no later query needs.
 
-        What the wires do next is not known: the next query looks again.
-
-        A later one is about `last_edge` or later, so the edges behind it and the level between are enough.
+        The wires' future is unknown, so the next query reads them again. Later queries are about `last_edge` or later,
+        so the edges behind it and the level between are enough.
         """
         self.change_tick, self.alone_until = 0, -_NEVER
         for transmitter in self.transmitters:
@@ -162,9 +161,9 @@ class Band:
             transmitter.line.hear(tick)
 
     def full_tick(self) -> int:
-        """The first tick at which 2048 edges of one robot wait to be heard, NEVER_TICK if there is none.
+        """The first tick at which 2048 edges of one robot wait for the receiver, NEVER_TICK if there is none.
 
-        A robot whose wire is full stops; it goes on when this tick was received.
+        A robot with a full wire stops, and continues when this tick was received.
         """
         tick = _NEVER
         for transmitter in self.transmitters:

@@ -1,4 +1,4 @@
-"""A two-state Markov chain over bit times that can be asked about any of them, in any order.
+"""A two-state Markov chain over bit times whose states can be evaluated in any order.
 
 A chain's state depends on its whole past, unless the draws are coupled. Here one draw u of slot i decides
 for both states at once:

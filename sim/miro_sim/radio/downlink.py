@@ -19,11 +19,13 @@ from miro_sim.radio.sender import Sender
 _BIT = HOST_BIT_TICKS
 _CHARACTER_TICKS = HOST_CHARACTER_TICKS
 MEMORY_TICKS = 2 * HOST_BIT_TICKS
-"""How long another network's transmission is kept after its end: a bit that it spoilt may still be going on."""
+"""Time for which another network's transmission is stored after its end: a bit that it disturbed may still be under
+way.
+"""
 
 
 class TransmissionError(ValueError):
-    """What is to be sent does not fit what is on the air already."""
+    """A transmission that does not fit the ones already on the air."""
 
 
 class Downlink:

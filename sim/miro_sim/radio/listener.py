@@ -25,10 +25,10 @@ assert (HOST_BIT_TICKS, CHARACTER_BITS) == (_BIT, _CHARACTER)
 
 
 class Listener:
-    """One robot's receiver. `bit_errors` counts the bits of its own network that it got wrong so far.
+    """One robot's receiver. `bit_errors` counts the wrong bits of its own network so far.
 
-    Characters that its module lost are not counted, nor what it heard of other networks. `rxd_state`: a fault of the
-    wire, of `RXD_STATES`.
+    Characters that its module lost are not counted, nor bits of other networks. `rxd_state`: a fault of the wire, of
+    `RXD_STATES`.
     """
 
     STATE = {
@@ -118,7 +118,7 @@ class Listener:
         self.pause(tick, until, senders, rank)
 
     def pause(self, tick: int, until: int, senders: list[Sender], rank: int) -> int:
-        """What is heard between the transmissions of `senders[rank]`; returns the tick reached."""
+        """Receives the pause between the transmissions of `senders[rank]`; returns the tick reached."""
         if tick >= until:
             return tick
         sender = senders[rank]
@@ -230,7 +230,7 @@ class Listener:
     def bit(
         self, begin: int, sent: int, first: int, number: int, fresh: bool, senders: list[Sender], rank: int
     ) -> int:
-        """The level in a bit that begins at `begin`; not `fresh`: it was asked for before, or is cut."""
+        """The level in a bit that begins at `begin`; not `fresh`: it was evaluated before, or is cut off."""
         level = sent
         if self.dropouts is not None and self.dropouts.bad(begin // _BIT):
             level = self.silence(begin, begin // _BIT)

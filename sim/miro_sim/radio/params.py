@@ -1,4 +1,5 @@
-"""What a radio network is like: the keys of a scenario's `[network.radio]`, and the ticks and chances they stand for.
+"""The parameters of a radio network: the keys of a scenario's `[network.radio]`, and the ticks and chances computed
+from them.
 
 Chances are thresholds of a 32-bit draw: a probability times 2^32. Bit errors are those of non-coherent FSK.
 """
@@ -30,7 +31,7 @@ MARGIN_STEPS = 128
 """Entries of `margin_table` in a margin of 1."""
 BIT_S = Fraction(clock.HOST_BIT_TICKS, clock.TICKS_PER_SECOND)
 BIT_ERROR_RATE = 1e-4
-"""What holds when a scenario names neither a bit-error rate nor Eb/N0."""
+"""Bit-error rate if a scenario gives neither that nor Eb/N0."""
 SLICER_ONE = 65_536
 """Half the distance of mark and space at the discriminator, in the units of the slicer's threshold."""
 
@@ -58,7 +59,7 @@ class Bursts(Ranged, frozen=True, forbid_unknown_fields=True, kw_only=True):
             )
 
     def chances(self) -> tuple[int, int]:
-        """Of going bad and of going good in a bit time."""
+        """Chances of going bad and of going good in a bit time."""
         return threshold(self.good_to_bad), threshold(self.bad_to_good)
 
 
@@ -77,7 +78,7 @@ class Dropouts(Ranged, frozen=True, forbid_unknown_fields=True, kw_only=True):
             )
 
     def chances(self) -> tuple[int, int]:
-        """Of losing the carrier and of its coming back in a bit time."""
+        """Chances of losing the carrier and of its return in a bit time."""
         return threshold(BIT_S / clock.exact(self.every_s)), threshold(BIT_S / clock.exact(self.length_s))
 
 
@@ -101,12 +102,12 @@ class SlicerParams(Ranged, frozen=True, forbid_unknown_fields=True, kw_only=True
 class Radio(Ranged, frozen=True, forbid_unknown_fields=True, kw_only=True):
     """One radio network: 9600 baud down to the robots and, with `telemetry`, a second band up.
 
-    `carrier` keyed is a transmitter that is on per frame only, `keyup_s` before its first start bit;
-    between frames the receiver's slicer makes noise, unless `squelch` holds it at mark. Errors come from
-    `bit_error_rate` or from `eb_n0_db`, not both. Networks with the same `channel` hear each other; without
-    one a network is alone. A transmission down is late by up to `jitter_s`. `lost_frames`: chance that it never goes on
-    the air; `lost_character_rate`: that a character never gets to the robot's UART.
-    `profile` names sets of these keys, see `profiles`; keys that are given win.
+    `carrier` keyed is a transmitter that is on per frame only, `keyup_s` before its first start bit; between frames the
+    receiver's slicer makes noise, unless `squelch` holds it at mark. Errors come from `bit_error_rate` or from
+    `eb_n0_db`, not both. Networks with the same `channel` receive each other; a network without a channel is isolated.
+    A transmission down is late by up to `jitter_s`. `lost_frames`: chance that it never goes on the air;
+    `lost_character_rate`: that a character never gets to the robot's UART. `profile` names sets of these keys, see
+    `profiles`; keys that are given win.
     """
 
     profile: ProfileName | tuple[ProfileName, ...] = ()
@@ -152,7 +153,7 @@ class Radio(Ranged, frozen=True, forbid_unknown_fields=True, kw_only=True):
 
     @property
     def bit_ticks(self) -> Fraction:
-        """One bit of the PC on a robot's clock: both offsets are one ratio, since that clock is the tick."""
+        """Ticks of one bit of the PC on a robot's clock: both offsets are one ratio, since that clock is the tick."""
         return bit_ticks(self.baud_offset_ppm, self.crystal_offset_ppm)
 
     @property

@@ -76,7 +76,7 @@ class Sender:
         return stops[number // _CHARACTER] != 0
 
     def level(self, tick: int) -> int:
-        """What is on the air at `tick`: 0 space, 1 mark, -1 no carrier."""
+        """The signal on the air at `tick`: 0 space, 1 mark, -1 no carrier."""
         for index in range(len(self.transmissions)):
             start, data, stops = self.transmissions[index]
             if start <= tick < self.end(start, len(data)):

@@ -17,7 +17,7 @@ assert CHARACTER_BITS == _STOP + 1
 
 
 class Uplink:
-    """What the PC hears from the robots of one network; the errors come from the stream NAME/errors.
+    """The PC's reception from the robots of one network; the errors come from the stream NAME/errors.
 
     `now`: everything below this tick has been received. `bit_errors`: samples taken of an inverted level.
     The robots' wires are this object's to forget: edges that it has come past are dropped from them.

@@ -36,7 +36,7 @@ class OtherBoard(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_onl
 
 
 def check_board(path: str, boards: Collection[str], key: str = "") -> None:
-    """Of several boards: that one's name is in front. Raises ValueError, which begins with `key`."""
+    """For several boards the file must have the board's name in front. Raises ValueError, which begins with `key`."""
     name = path.partition(".")[0]
     if name not in boards:
         remedy = did_you_mean(name, boards) or f"write {next(iter(boards))}.{path}"
@@ -122,7 +122,7 @@ class BoardScenario(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_
 
     @property
     def periods(self) -> int:
-        """Digest periods of a run, which ends by itself with the one in which its duration does."""
+        """Digest periods of a run; the last one is that in which its duration ends."""
         if self.duration_ticks is None:
             return MOST_PERIODS
         return max(1, -(-self.duration_ticks // PERIOD_TICKS))

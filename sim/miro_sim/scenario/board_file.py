@@ -72,7 +72,7 @@ class _File(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_only=Tru
 
     @property
     def memory(self) -> Literal["none", "internal", "external"]:
-        """Where MOVX goes. Not said: into the RAM of the chip, which is on after a reset, if it has one."""
+        """The memory accessed by MOVX. Default: the RAM of the chip, if it has one, which is on after a reset."""
         return self.xram or ("internal" if CHIPS[self.chip].xram_bytes else "none")
 
 
@@ -191,7 +191,7 @@ def _check_processor(file: _File) -> None:
 
 
 def _check_memory(file: _File) -> None:
-    """That no two answer to one address of MOVX."""
+    """Checks that no two memories answer to one address of MOVX."""
     if file.xram_bytes is not None and file.memory != "external":
         raise BoardError(
             "", "xram_bytes", f"the board's xram is {file.memory!r}", 'give xram = "external", too'
@@ -259,7 +259,7 @@ def keys_of(struct: type[PartKeys], table: dict[str, Any]) -> PartKeys:
 
 
 def check_struct(struct: type[PartKeys]) -> None:
-    """That a part, which somebody else may have written, has pins and values as it should. Raises PluginError."""
+    """Checks a part's pins and values, as it may come from another author. Raises PluginError."""
     name, pins = struct.__struct_config__.tag, struct.PINS
     if not isinstance(pins, tuple) or not all(isinstance(pin, Pin) for pin in pins):
         raise PluginError(f"part {name!r}: PINS are {pins!r:.80}", "write PINS = (Pin(..), Pin(..))")

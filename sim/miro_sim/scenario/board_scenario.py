@@ -108,7 +108,7 @@ def is_board(source: str) -> bool:
 
 
 def any_of_text(text: str, origin: str, settings: Sequence[str] = ()) -> AnyText:
-    """As `load_any`, of a text that `origin` names, or that stands in no file ("")."""
+    """Like `load_any`, for a text that `origin` names, or that is in no file ("")."""
     raw = tables_of(text, origin)
     if BOARD not in raw and SCENARIO not in raw:
         return robots_file.of_text(text, origin, settings)
@@ -119,7 +119,7 @@ def any_of_text(text: str, origin: str, settings: Sequence[str] = ()) -> AnyText
 
 
 def board_of_tables(raw: Table, origin: str, settings: Sequence[str] = (), beside: str = "") -> BoardText:
-    """As `load_any`, of tables that stand in another file. `beside`: the path of that one, "" if they may name none."""
+    """Like `load_any`, for tables in another file. `beside`: path of that file, "" if they may name none."""
     return _checked(_complete(raw, beside), origin, settings)
 
 
@@ -206,7 +206,7 @@ def _board_table(origin: str, board: str) -> Table:
 
 
 def _beside(origin: str, key: str, path: str) -> str:
-    """What a file names, as it is called from here. Raises ScenarioError for what lies outside of its folder."""
+    """Path of a file named in another, relative to here. Raises ScenarioError for one outside of that file's folder."""
     if not origin:
         problem = "names a file, and stands in none itself"
         raise ScenarioError(origin, key, problem, "write the whole table instead")
@@ -311,7 +311,7 @@ def _line(tables: Table) -> tuple[str, BoardSpec, dict[str, OtherBoard]]:
 
 
 def _puts_on_line(name: str, board: BoardSpec, others: dict[str, OtherBoard], table: Table) -> Table:
-    """As `_puts`, of several boards, whose names come first."""
+    """Like `_puts`, for several boards, whose names come first."""
     puts: Table = {}
     boards = {name: board, **{other: on_line.board for other, on_line in others.items()}}
     for path, value in leaves(table):

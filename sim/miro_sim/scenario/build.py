@@ -75,7 +75,7 @@ def reference_and_start(robot: sc.RobotSpec, duration_s: float) -> tuple[Traject
 
 
 def dead_s(scenario: sc.Scenario, network: sc.NetworkSpec) -> float:
-    """What a PC knows of its own delay: from a period's begin to the end of its frame."""
+    """The PC's own delay in seconds: from a period's begin to the end of its frame."""
     radio = network.radio
     keyup_s = radio.keyup_s if radio.carrier == "keyed" else 0.0
     return scenario.host.compute_s + keyup_s + radio.latency_s + seconds(DOWNLINK[network.robots].air_ticks)
@@ -111,7 +111,7 @@ def _remembering(plugin: Any, maker: Any) -> Any:
 
 
 def _a_plugin(plugin: Any, method: str, maker: Any) -> Any:
-    """What `maker` returned, which has to have this method. Raises PluginError."""
+    """Checks that the result of `maker` has this method. Raises PluginError."""
     if not hasattr(plugin, method):
         problem = f"`{maker.__name__}` returned {plugin!r:.40}"
         raise PluginError(
@@ -134,7 +134,7 @@ def _made(word: str, name: str, make: Callable[[], Any]) -> Any:
 def pilot_and_drive(
     robot: sc.RobotSpec, scenario: sc.Scenario, network: int, wheels: Stream, noise: Stream
 ) -> tuple[Pilot, DifferentialDrive]:
-    """Who steers a robot, and what it drives with. Raises PluginError."""
+    """The pilot and the drive of a robot. Raises PluginError."""
     reference, start = reference_and_start(robot, scenario.duration_s)
     return pilot_for(robot, reference, scenario, network), drive_for(robot, start, wheels, noise)
 

@@ -40,10 +40,10 @@ class GaussianCamera(
 
 
 class CalibrationErrorSizes(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_only=True):
-    """How large the errors of a calibration are, each by itself; `calibration = "1997"` draws signs and directions.
+    """Sizes of the independent errors of a calibration; `calibration = "1997"` draws signs and directions.
 
-    `worst_cm`: the drawn errors are scaled together to this worst case over the pitch; 0 leaves them as they are.
-    `ignore_height` takes the patches to lie on the floor, `ignore_distortion` the lens to be straight.
+    `worst_cm`: the drawn errors are scaled together to this worst case over the pitch; 0: not scaled. `ignore_height`:
+    the patches are evaluated on the floor; `ignore_distortion`: the lens is assumed to have none.
     """
 
     centre_px: Annotated[float, Meta(ge=0.0, le=20.0)] = 1.0
@@ -55,7 +55,7 @@ class CalibrationErrorSizes(msgspec.Struct, frozen=True, forbid_unknown_fields=T
 
 
 class SeeingCamera(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_only=True):
-    """What `pixels` and `geometric` have in common: lens, pattern of the patches, calibration, whole frames.
+    """The common part of `pixels` and `geometric`: lens, pattern of the patches, calibration, whole frames.
 
     `dropped_frames`, `repeated_frames`: chance for each frame that it never comes, or that the one before comes again.
     `lost_robots`: chance for each robot and frame that it is not found.

@@ -14,7 +14,7 @@ from miro_host.references.interface import Reference
 from miro_host.wheels import Wheels
 
 Problem = tuple[str, str]
-"""What is wrong with a reference, and the remedy."""
+"""An error of a reference, and the remedy."""
 Places = Iterable[tuple[float, Reference]]
 """A reference at several times in s, in their order."""
 
@@ -25,7 +25,7 @@ ORIGIN_M = 1e-6
 
 
 def limits_problem(frames: Places, law: LawParameters) -> Problem | None:
-    """What is wrong with the speeds of a reference at the camera frames `frames`."""
+    """The error of a reference that exceeds speed limits at the camera frames `frames`; None if it does not."""
     period_s = seconds(CONTROL_PERIOD_TICKS)
     wheels = Wheels()
     v_before = w_before = 0.0
@@ -56,9 +56,9 @@ def _beyond(t_s: float, at: Reference, name: str, value: str, limit: str) -> Pro
 
 
 def origin_problem(places: Places, law: LawParameters) -> Problem | None:
-    """What is wrong if a path comes too near to the origin (equation 11 of the paper).
+    """The error of a path that comes too near to the origin (equation 11 of the paper).
 
-    A path that starts in the origin may only go away from it until it has reached the law's clearance.
+    A path that starts in the origin must move away from it until it has reached the law's clearance.
     """
     clearance_m = law.ORIGIN_CLEARANCE_M
     if clearance_m == 0.0:

@@ -1,4 +1,4 @@
-"""What is wrong with a scenario, in one line: file, key path, what, and what to write instead."""
+"""Error messages about a scenario, in one line: file, key path, reason, and remedy."""
 
 import re
 from functools import cache
@@ -43,7 +43,7 @@ TYPE_NAMES = {**toml_text.TYPE_NAMES, "array": "an array of tables"}
 PARTS_OF_A_ROBOT = ("reference", "controller")
 """Tables that every robot of a scenario needs."""
 FILE_KEYS = ("scenario", "set", "variant")
-"""What a file may also say at its top (`base`, `variants`)."""
+"""Further top-level keys of a file (`base`, `variants`)."""
 SCENARIO_IS_MEANT = ("base", "based_on", "extends", "from", "inherits", "parent")
 
 
@@ -59,7 +59,7 @@ class Refused(BadInput):
 
 
 def value_error(origin: str, raw: dict[str, Any], message: str) -> ScenarioError:
-    """What msgspec found, in the words of the file: path without `$`, and a remedy."""
+    """msgspec's error in the words of the file: path without `$`, and a remedy."""
     problem, path = toml_text.what_and_path(message)
     unknown = re.fullmatch(r"(?s)Object contains unknown field `(.*)`", problem)
     if unknown:
@@ -90,7 +90,7 @@ def value_error(origin: str, raw: dict[str, Any], message: str) -> ScenarioError
 
 
 def explained(problem: str, path: str, value: Any, remedy: str) -> tuple[str, str]:
-    """What is wrong with a value, and the remedy: what msgspec found at a key path, in the words of the file."""
+    """Reason and remedy for msgspec's error at a key path, in the words of the file."""
     wrong_type = re.fullmatch(r"Expected `([\w |]+)`, got `(\w+)`", problem)
     if wrong_type:
         want = " or ".join(
@@ -126,7 +126,7 @@ def _of_a_file(key: str) -> str:
 
 
 def remedy_for_key(key: str, known: list[str]) -> str:
-    """What to write instead of an unknown key: the same quantity in its own unit, or the nearest spelling."""
+    """The remedy for an unknown key: the same quantity in its own unit, or the nearest spelling."""
     stem = _stem(key)
     for candidate in known:
         if _stem(candidate) == stem and candidate != key and unit_name(candidate):
@@ -167,7 +167,7 @@ def _quoted_number(want: str, value: Any) -> str:
 
 
 def value_at(raw: Any, path: str) -> Any:
-    """What stands at a key path like `network[0].radio.keyup_s`, or None."""
+    """The value at a key path like `network[0].radio.keyup_s`, or None."""
     for key, index in re.findall(r"([^.\[\]]+)|\[(\d+)\]", path):
         try:
             raw = raw[int(index)] if index else raw[key]
@@ -178,12 +178,15 @@ def value_at(raw: Any, path: str) -> Any:
 
 @cache
 def _type_of(struct: type) -> msgspec.inspect.Type:
-    """Of all that the struct may hold: 15 ms of work for a scenario, and an error asks for it up to four times."""
+    """The type of the struct with everything in it.
+
+    Cached: 15 ms of work for a scenario, needed up to four times per error.
+    """
     return msgspec.inspect.type_info(struct)
 
 
 def _type_at(raw: Any, path: str) -> msgspec.inspect.Type | None:
-    """What a scenario may have at a key path; below tagged tables, these tables."""
+    """The type allowed at a key path; below tagged tables, of these tables."""
     kind = _type_of(Scenario)
     for key, index in re.findall(r"([^.\[\]]+)|\[(\d+)\]", path):
         kind = _chosen(kind, raw)
@@ -201,7 +204,7 @@ def _type_at(raw: Any, path: str) -> msgspec.inspect.Type | None:
 
 
 def _chosen(kind: msgspec.inspect.Type, table: Any) -> msgspec.inspect.Type:
-    """The type itself; where it is any plug-in's table, or of several kinds, that which the table names."""
+    """The type itself; of a plug-in's table, or of several kinds, the one that the table names."""
     if isinstance(kind, msgspec.inspect.UnionType) and isinstance(table, dict):
         structs = [option for option in kind.types if isinstance(option, msgspec.inspect.StructType)]
         named = [
@@ -255,7 +258,7 @@ def _other_plugin(raw: Any, path: str, key: str) -> str:
 
 
 def _choices_at(raw: Any, path: str) -> str:
-    """What a key may hold, if that is one of a few: words, numbers, or the kinds of its table."""
+    """The possible values of a key, if there are few: words, numbers, or kinds of its table."""
     above, _, key = path.rpartition(".")
     kind, table = _type_at(raw, path), _type_at(raw, above)
     if isinstance(table, msgspec.inspect.CustomType) and REGISTRIES[table.cls].key == key:
@@ -272,7 +275,7 @@ def _literals(kind: msgspec.inspect.Type | None) -> list[str]:
 
 
 def choices_of(struct: type[msgspec.Struct], key: str) -> str:
-    """What a key of a struct may hold, if that is one of a few words or numbers."""
+    """The possible values of a struct's key, if they are a few words or numbers."""
     fields = msgspec.structs.fields(struct)
     literals = [_literals(_type_of(field.type)) for field in fields if field.encode_name == key]
     return use_one_of(literals[0]) if literals and literals[0] else ""

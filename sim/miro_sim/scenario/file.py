@@ -89,7 +89,7 @@ def load(source: str, settings: Sequence[str] = ()) -> ScenarioText:
 
 
 def of_text(text: str, origin: str, settings: Sequence[str] = ()) -> ScenarioText:
-    """As `load`, of a text that `origin` names."""
+    """Like `load`, for a text that `origin` names."""
     raw = tables_of(text, origin)
     whole, own = with_base(raw, origin, _base_tables)
     with_points = put_paths(whole, origin)

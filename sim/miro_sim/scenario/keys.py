@@ -50,9 +50,9 @@ class HostSpec(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_only=
 
 
 class RobotSpec(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_only=True):
-    """One robot: its slot on the network, where it starts, what it follows and who steers it.
+    """One robot: slot on the network, start, reference, estimator and controller.
 
-    `strap`: what its slot pins say, if not its slot.
+    `strap`: value on its slot pins, if not its slot.
 
     Start and reference have to lie on the pitch (`places`).
     The start is the start of the reference plus the errors (captions of the paper's Figs. 6 and 8). Each
@@ -98,8 +98,8 @@ class ControlNoise(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_o
 
 
 class NetworkSpec(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_only=True):
-    """One radio frequency: one host, `robots` slots (the layout of its frames), and the robots that are
-    present. A `silent` host sends nothing by itself: its frames come from who runs the scenario (`World.inject`).
+    """One radio frequency: one host, `robots` slots (the layout of its frames), and the robots that are present. A
+    `silent` host sends nothing: its frames are injected by the program that runs the scenario (`World.inject`).
     """
 
     robots: Literal[3, 5] = 3
@@ -166,7 +166,7 @@ class Scenario(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_only=
     step: tuple[dict[str, Any], ...] = ()
     networks: Annotated[tuple[NetworkSpec, ...], Meta(min_length=1)] = msgspec.field(name="network")
     clock: ClassVar[int] = TICKS_PER_SECOND
-    """Of the world."""
+    """Ticks per second of the world."""
     period_ticks: ClassVar[int] = CONTROL_PERIOD_TICKS
     """A control period."""
 
@@ -179,7 +179,7 @@ class Scenario(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_only=
 
     @property
     def periods(self) -> int:
-        """Control periods of a run, which ends by itself with the one in which its duration does."""
+        """Control periods of a run; the last one is that in which its duration ends."""
         return max(1, -(-ticks(self.duration_s) // CONTROL_PERIOD_TICKS))
 
     @property

@@ -27,7 +27,9 @@ STEP_M = 0.005
 STEP_RAD = 0.02
 """.. and the turn between them, whichever is less: between them a corner bulges by less than 0.1 mm."""
 MOST_S = 3600.0
-"""So long a reference of another distribution is checked, at each camera frame: this takes a few seconds."""
+"""Longest time for which a reference of another distribution is checked, at each camera frame: this takes a few
+seconds.
+"""
 Problem = tuple[str, str, str]
 """The key of what is wrong, what that is, and the remedy."""
 
@@ -40,9 +42,10 @@ def robot_problem(
     duration_s: float,
     lens: Lens | None,
 ) -> Problem | None:
-    """What is wrong with where a robot starts, with its reference, which has these parameters, or with both together.
+    """The error in a robot's start, in its reference (with these `parameters`), or in both together; None if there is
+    none.
 
-    `lens`: that of a camera which has to see the robot at its start. Raises PluginError and DomainError.
+    `lens`: of a camera that must see the robot at its start. Raises PluginError and DomainError.
     """
     assert isinstance(law, LawParameters)
     off = _off_pitch(start)
@@ -123,7 +126,7 @@ def lens_of(camera: Camera) -> Lens | None:
 
 
 def camera_problem(camera: Camera, networks: int) -> Problem | None:
-    """What is wrong with a camera that does not see the pitch, or of more teams than there are colours."""
+    """The error of a camera that does not see the pitch, or that has more teams than there are colours; else None."""
     lens = lens_of(camera)
     if lens is None:
         return None
@@ -165,7 +168,7 @@ def _edge() -> Iterator[tuple[float, float]]:
 
 
 def _pixel(lens: Lens, x_m: float, y_m: float, z_m: float) -> tuple[float, float] | None:
-    """Where the lens draws it; None where it cannot."""
+    """The projected pixel; None if the lens cannot project the point."""
     try:
         return lens.pixel(x_m, y_m, z_m)
     except ValueError:

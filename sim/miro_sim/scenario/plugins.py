@@ -23,7 +23,7 @@ REGISTRIES: dict[type, Registry[Any]] = {
 
 
 class PluginTableError(ValueError):
-    """What is wrong in a plug-in's table, in msgspec's form: what, and the path below the table."""
+    """An error in a plug-in's table, in msgspec's form: reason, and the path below the table."""
 
 
 def plugin_of(kind: type, table: object) -> object:
@@ -56,7 +56,7 @@ def struct_of(registry: Registry[Any], keys: dict[str, Any]) -> type[msgspec.Str
 def plugins_used(
     scenario: msgspec.Struct, describe: Callable[[str, str], str] = described
 ) -> tuple[str, ...]:
-    """What other distributions bring of all that a scenario names, as `described`: in order, each once."""
+    """The plug-ins of other distributions that a scenario names, as `described`: in order, each once."""
     return tuple(sorted({text for kind, name in _named(scenario) if (text := describe(kind, name))}))
 
 
@@ -87,7 +87,7 @@ def table_of(value: Any) -> dict[str, Any]:
 
 
 def cause_of(error: msgspec.ValidationError) -> BaseException | None:
-    """What a plug-in raised while its table was read, if one did."""
+    """The exception that a plug-in raised while its table was read; None if there was none."""
     return error.__cause__.__cause__ if isinstance(error.__cause__, PluginTableError) else None
 
 

@@ -22,7 +22,7 @@ def tables_of(kind: str) -> Mapping[str, Mapping[str, Any]]:
 
 
 def named(kind: str, name: object) -> Mapping[str, Any]:
-    """What the profile or variant with this name says. Raises Refused."""
+    """The keys of the profile or variant with this name. Raises Refused."""
     known = tables_of(kind)
     if not isinstance(name, str) or name not in known:
         raise Refused(

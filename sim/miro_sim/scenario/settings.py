@@ -32,7 +32,7 @@ TABLES = {"camera": "kind", "controller": "law", "estimator": "kind", "reference
 _OF_ALL = {"law": "controller", "estimator": "estimator", "reference": "reference"}
 """Settings that choose the kind of this table for all robots."""
 _DEFAULTS = {registry.default for registry in REGISTRIES.values() if registry.default}
-"""What they say where they are missing."""
+"""Names of default plug-ins, which apply to tables without a name."""
 
 
 class Setting(msgspec.Struct, frozen=True):
@@ -51,7 +51,7 @@ class Setting(msgspec.Struct, frozen=True):
 
     @property
     def place(self) -> str:
-        """How errors name it."""
+        """Its name in errors."""
         return _option(self.text, self.option)
 
     def concerns(self, path: str) -> bool:
@@ -227,7 +227,7 @@ def drop_other_kind(error: ScenarioError, settings: Sequence[Setting]) -> tuple[
 
 
 def _deeper(key_path: str, setting: Setting, raw: Table) -> str:
-    """Where a key stands that was looked for too far above: at the top, in a network or in a robot."""
+    """The path of a key that was given too far above: at the top, in a network or in a robot."""
     key = key_path.rpartition(".")[2]
     match = re.search(rf"(?:^|\.){re.escape(key)}([.=\[].*)", setting.text, re.DOTALL)
     if match is None or not re.fullmatch(r"(network\[\d+\]\.)?(robot\[\d+\]\.)?[^.\[\]]+", key_path):
@@ -248,7 +248,7 @@ def _deeper(key_path: str, setting: Setting, raw: Table) -> str:
 
 
 def _with_tag(key: str, rest: str) -> str:
-    """What follows a key in a setting; a name that was given for a whole table chooses the table's kind."""
+    """The rest of a key in a setting; a name given for a whole table selects the table's kind."""
     value = rest.removeprefix("=").strip("\"' ")
     return (
         f".{TABLES[key]}={value}" if key in TABLES and rest.startswith("=") and value.isidentifier() else rest

@@ -1,4 +1,4 @@
-"""What is at the end of a board's wire instead of another machine: bytes for its serial port, levels for its pins.
+"""The terminal at the end of a board's wire: bytes for its serial port, levels for its pins.
 
 Pins come from a text file:
 

@@ -1,8 +1,8 @@
 """Variants: named amounts of disturbance for a whole scenario, `ideal` and `realistic`.
 
-Two rules. On the command line (`--set variant=ideal`) a variant wins over the file, because that is what it is asked
-for: all keys that disturb are taken out of the scenario, and those of the variant put in; settings after it win over
-it. In a file (`variant = "ideal"`) it is a default: keys that the file gives win.
+Two rules. On the command line (`--set variant=ideal`) a variant overrides the file, because the user asks for it: all
+keys that disturb are taken out of the scenario, and those of the variant put in; settings after it win over it. In a
+file (`variant = "ideal"`) it is a default: keys that the file gives win.
 """
 
 from collections.abc import Iterator, Mapping
@@ -17,7 +17,9 @@ DISTURBING_CAMERA = (
     *("kind", "calibration", "calibration_errors", "picture", "delay_frames", "dropped_frames"),
     *("repeated_frames", "lost_robots", "position_error_cm", "heading_error_deg", "pixel_cm"),
 )
-"""What a variant takes out of `[camera]`; lens, pattern, window and ball stay, if the kind of camera does."""
+"""Keys that a variant removes from `[camera]`; lens, pattern, window and ball stay if the kind of camera is
+unchanged.
+"""
 STAYS_IN_RADIO = ("telemetry", "channel")
 DISTURBING_DRIVE = ("tyre", "ball", "disturbance")
 DISTURBING_CHASSIS = (

@@ -35,14 +35,16 @@ if TYPE_CHECKING:
     from miro_sim.world.medium import Medium
 
 SETTLE_TICKS = 120
-"""How far beyond a robot's stop the line must be known: an instruction may overrun by four machine cycles."""
+"""The line must be known this far beyond a robot's stop, in ticks: an instruction may overrun by four machine
+cycles.
+"""
 RESET, POWER, RADIO_DOWN, RADIO_UP, PUT, RESEED_DOWN, RESEED_UP, RXD, FAULT = range(9)
 _EVENTS = {
     RESET: "reset", POWER: "power", RADIO_UP: "radio", PUT: "put", RESEED_UP: "reseed", FAULT: "hardware",
 }  # fmt: skip
 _LIMITS = {RADIO_DOWN: len(LINK_STATES) - 1, RADIO_UP: len(LINK_STATES) - 1, RXD: len(RXD_STATES) - 1}
 DIP = b"power dip"
-"""A fault that begins all again, and is logged as what it is for who judges: the supply comes."""
+"""A fault that restarts everything, and is logged as a power dip for checks; the supply returns."""
 _MOST_WAITING = 1 << 16
 
 
@@ -92,11 +94,11 @@ class Actions:
 
     @property
     def next_tick(self) -> int:
-        """When the next one is due."""
+        """Tick of the next action."""
         return self.waiting[0].tick if self.waiting else NEVER_TICK
 
     def next_after(self, tick: int) -> int:
-        """When the next one is due that is not due at `tick`."""
+        """Tick of the next action that is not due at `tick`."""
         for action in self.waiting:
             if action.tick > tick:
                 return action.tick
@@ -174,7 +176,7 @@ class Actions:
         return done
 
     def announced(self) -> list[Action]:
-        """Those that wait."""
+        """Actions that wait."""
         return [self._action(waiting) for waiting in self.waiting if waiting.what in _EVENTS]
 
     def _action(self, action: WaitingAction) -> Action:

@@ -96,12 +96,12 @@ class Bodies:
 
 
 def _most_m_s(robot: Robot) -> float:
-    """No robot is faster, unless a force pushes it."""
+    """Largest speed of the robot unless a force pushes it, in m/s."""
     params = robot.drive.params
     return math.inf if params.disturbance.is_on() else params.top_speed_m_s()
 
 
 def _noted(robot: Robot, tick: int) -> Pose:
-    """Where the robot was at a tick of the grid; its last note is of the one before `grid_tick`."""
+    """Pose of the robot at a tick of the grid; its last note is of the one before `grid_tick`."""
     # From the end: at which tick the notes begin is not kept.
     return robot.noted[len(robot.noted) - (robot.grid_tick - tick) // GRID_TICKS]

@@ -1,4 +1,4 @@
-"""Changes of nets and of values of parts on one board, with exact ticks, for who watches them: waits and checks.
+"""Changes of nets and of values of parts on one board, with exact ticks, for waits and checks.
 
 All edges below the tick at which the world stands are known. A net that somebody has watched once is watched to the end
 of the run, so that a wait knows what happened on the tick at which the one before it ended. Values are looked at on a
@@ -25,11 +25,11 @@ if TYPE_CHECKING:
     from miro_sim.world.wire import BoardAlone
 
 KEPT = 1 << 16
-"""Entries of a log that are kept for who has not read it for long."""
+"""Entries of a log kept for a reader that has not read it for long."""
 
 
 class PinPlace(msgspec.Struct, frozen=True):
-    """Where a name of a pin leads: a net, -1 for a port pin with nothing on it; `port_pin`: 8 * port + bit, or -1."""
+    """The net of a pin's name, -1 for an unconnected port pin; `port_pin`: 8 * port + bit, or -1."""
 
     net: int
     port_pin: int = -1
@@ -79,7 +79,7 @@ class Log:
         return self.first + len(self.changes)
 
     def since(self, serial: int, tick: int) -> list[Change]:
-        """Those from `serial` on below `tick`."""
+        """Changes from `serial` on, before `tick`."""
         changes = self.changes[max(0, serial - self.first) :]
         while changes and changes[-1][0] >= tick:
             changes.pop()
@@ -101,7 +101,7 @@ class Log:
 
 
 class Changes:
-    """Of one board. `edges`: (tick, net, level); `values`: (tick, PART.KEY, value)."""
+    """The changes of one board. `edges`: (tick, net, level); `values`: (tick, PART.KEY, value)."""
 
     NOT_STATE = ("*",)
 
@@ -161,7 +161,7 @@ class Changes:
                 self.values.changes.append((tick, path, value))
 
     def look_at_grid(self) -> None:
-        """The board has come to the next tick of the grid."""
+        """Samples the values at the next tick of the grid."""
         self.look(self.look_tick)
         self.look_tick += self.grid_ticks
 

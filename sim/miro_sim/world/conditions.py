@@ -32,7 +32,7 @@ Seq = Annotated[int, Meta(ge=0, lt=SEQ_MODULUS)]
 Byte = Annotated[int, Meta(ge=0, le=0xFF)]
 Word = Annotated[int, Meta(ge=0, le=0xFFFF)]
 SpeedMS = Annotated[float, Meta(ge=-2.876, le=2.876)]
-"""What a 16-bit word carries."""
+"""Speeds that a 16-bit word can carry."""
 _CHIP_PINS = ("cs", "rd", "wr", "ps", "rst", "hi", "pwm", "sign")
 _WIRES = ("rxd", "txd", *(f"{side}.{pin}" for side in ("left", "right") for pin in _CHIP_PINS))
 PORT_PINS = {f"P{port}.{bit}": (port, bit) for port in range(4) for bit in range(8)}
@@ -61,13 +61,13 @@ class Condition(
     """Something that becomes true at a tick, at the PC of `network`. Raises ValueError for what can never be."""
 
     OF_EVENT: ClassVar[Mapping[str, Callable[[Event], object]]] = {}
-    """What an event says, by the fields that ask for it."""
+    """Field -> function that reads its value from an event."""
     DETAILS: ClassVar[tuple[str, ...]] = ()
     """The fields in which events of one kind at one place differ."""
     needs: ClassVar[Feature | None] = None
-    """Of the machine; a PC hears and sends without anything more."""
+    """The feature of a machine that the condition needs; a PC can send and receive without one."""
     SUBJECTS: ClassVar[tuple[Kind, ...]] = ("robot",)
-    """What a file may name it for: robots, a board alone."""
+    """The kinds of device for which a file may name it: robots, a single board."""
 
     network: Network = 0
 
@@ -137,7 +137,7 @@ class Answer(Condition, frozen=True, kw_only=True, tag="answer"):
 
 
 def answer_of(frame: events.Received) -> TelemetryFrame | None:
-    """What an answer says; None for what no robot may say."""
+    """The content of an answer; None for content that no robot may send."""
     try:
         message = frame.message(max(ROBOT_COUNTS))
     except ContentError:
@@ -146,7 +146,7 @@ def answer_of(frame: events.Received) -> TelemetryFrame | None:
 
 
 def answer_fields(event: Event) -> dict[str, int | bool]:
-    """What an answer says, under the keys of `Answer`; nothing where it says what no robot may."""
+    """The content of an answer, under the keys of `Answer`; empty for content that no robot may send."""
     answer = None if event.frame is None else answer_of(event.frame)
     if answer is None:
         return {}
@@ -491,7 +491,7 @@ class Text(Condition, frozen=True, kw_only=True, tag="text"):
 
     @property
     def key(self) -> bytes:
-        """What an event says of the condition that it fulfils."""
+        """The event's key for the condition that it fulfils."""
         return f"{self.text!r} {self.pattern!r}".encode()
 
 
@@ -550,7 +550,7 @@ def _name_of(predicate: Any) -> str:
 Recorded = Answer | Heard | Frame | Command | Received | Transmitted | Sent | Fault | Touch
 """The conditions that are logged whether somebody waits for them or not, so that a check can judge them."""
 OnBoard = Edge | Level | Pulse | Frequency | Duty | Text | Value
-"""Those that a check of a board can judge, because it follows them."""
+"""Conditions that a check of a board can judge, because it follows them."""
 CONDITIONS: dict[str, type[Condition]] = {
     str(struct.__struct_config__.tag): struct
     for struct in (

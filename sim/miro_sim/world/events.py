@@ -1,4 +1,4 @@
-"""What happened in a world: one record per event, from the logs of the boards and of the PC.
+"""The events of a world: one record per event, from the logs of the boards and of the PC.
 
 what        at the tick at which                                          fields
 sent        the first start bit of a host's transmission leaves           data, good_stop (of all characters)
@@ -185,7 +185,7 @@ class HostLog:
 
 
 def _kind(record: Event | Transmission | Received | Symbol) -> str:
-    """Of what a host log keeps."""
+    """The kind of a host log's record."""
     if isinstance(record, Event):
         return record.what
     if isinstance(record, Transmission):
@@ -235,7 +235,7 @@ _KINDS = {
 
 
 class Cursor:
-    """Who reads a log on, from now: `next` is the serial number of the first event that was not read."""
+    """A reader of a log, from now on: `next` is the serial number of the first unread event."""
 
     NOT_STATE = ("*",)
 

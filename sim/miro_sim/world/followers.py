@@ -1,4 +1,4 @@
-"""What the changes of a pin, of a value, or of the text on a wire come to for one condition: pure functions over them.
+"""Evaluates one condition from the changes of a pin, of a value, or of the text on a wire, as pure functions.
 
                     begins with the level           first                             second
     changes ──> feed ─────────────────> matches: (tick, measurement), in order; `found`: what was there instead
@@ -29,14 +29,14 @@ _ENDLESS = 1e300
 
 
 class Follower:
-    """Base. `source`: whose changes it follows. `clock`: ticks per second.
+    """Base of followers. `source`: the pin, value or wire that it follows. `clock`: ticks per second.
 
     `count`: measurements so far; `last`: the last of them, at `last_tick`.
     """
 
     NOT_STATE = ("*",)
     FIELDS: tuple[str, ...] = ("count", "last", "last_tick")
-    """What changes while it follows."""
+    """Attributes that change while it follows."""
 
     def __init__(self, source: object, clock: int) -> None:
         self.source = source
@@ -46,11 +46,11 @@ class Follower:
         self.last_tick = -1
 
     def feed(self, changes: list[Change], until_tick: int) -> list[Match]:
-        """What fits among these changes, and what fits up to `until_tick` because nothing changes."""
+        """Matches among these changes, and matches up to `until_tick` because nothing changes."""
         raise NotImplementedError
 
     def found(self) -> str:
-        """What was there, for a message."""
+        """The observed state, for a message."""
         raise NotImplementedError
 
     def save(self) -> list[Any]:
@@ -71,7 +71,7 @@ class Follower:
 
 
 class PinFollower(Follower):
-    """Base of those of pins, whose source is the number of a net. `flip`: 1 for a pin behind an inverter.
+    """Base of followers of pins, whose source is the number of a net. `flip`: 1 for a pin behind an inverter.
 
     `least`, `most`: what a measurement must not be below and above, or with `outside` has to.
     """

@@ -1,7 +1,7 @@
-"""What links, steps and waits may do with a machine: a `World`, or robots at a port of this PC.
+"""The interface of a machine for links, steps and waits: a `World`, or robots at a port of this PC.
 
-A condition or a step says what it `needs` of a machine; a machine says what it `lacks`, and why. What only a twin has
-(memory, digests, saved states) is not here but in `World`.
+A condition or a step declares what it `needs` of a machine; a machine declares what it `lacks`, and why. Features of a
+twin only (memory, digests, saved states) are in `World`.
 """
 
 from __future__ import annotations
@@ -26,11 +26,11 @@ Feature = Literal["bad stop", "inside", "switch", "save"]
 
 
 class NotObservable(Exception):
-    """What this machine can neither show nor do."""
+    """An operation or observation that this machine does not support."""
 
 
 class MachineLine(Protocol):
-    """One line of a machine. `devices`: those whose inside it shows; `first_slot`: of all that are on it."""
+    """One line of a machine. `devices`: those whose inside it shows; `first_slot`: of all devices on it."""
 
     @property
     def index(self) -> int: ...

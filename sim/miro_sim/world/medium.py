@@ -1,4 +1,4 @@
-"""What devices and a PC hear each other by: the base class of the radio network and of the wire.
+"""The medium between devices and a PC: the base class of the radio network and of the wire.
 
      outbox ──> send ──> devices' RXD      the host's transmissions, as soon as they must be known
 PC <── hear <─────────── devices' TXD      what the devices sent
@@ -74,7 +74,7 @@ class Medium:
     # Pieces of a control period
 
     def begin_period(self, tick: int) -> None:
-        """What happens when a control period begins."""
+        """Called at the begin of a control period."""
         self.sent = []
 
     def send_due(self, rendezvous_tick: int) -> None:
@@ -105,7 +105,7 @@ class Medium:
         raise NotImplementedError
 
     def end_period(self) -> list[Transmission]:
-        """What the host sent and received in the period that is over."""
+        """The host's transmissions and receptions in the period that has ended."""
         raise NotImplementedError
 
     def part_values(self, tick: int) -> Sequence[PartValues]:
@@ -115,7 +115,7 @@ class Medium:
     # Input
 
     def free_tick(self) -> int:
-        """When the transmitter is free of all that has been sent."""
+        """Tick at which the transmitter has sent everything."""
         raise NotImplementedError
 
     def earliest_tick(self, now: int) -> int:
@@ -174,17 +174,17 @@ class Medium:
     # For the summary
 
     def link_counts(self) -> tuple[int, int]:
-        """Transmissions of the host, and bits that came out wrong on either way, so far."""
+        """Number of the host's transmissions, and of wrong bits in both directions, so far."""
         raise NotImplementedError
 
     def vision_counts(self) -> dict[str, int]:
-        """What the camera of this network missed; nothing without a camera."""
+        """Counts of frames and robots that this network's camera missed; empty without a camera."""
         return {}
 
     # Going back, and loading
 
     def records(self) -> list[Any]:
-        """What observers take away and no snapshot holds, to go back to with `put_back`."""
+        """Lists that observers take and that no snapshot contains; `put_back` restores them."""
         devices = [device.records() for device in self.devices]
         # Copies: the piece that follows appends to both.
         return [list(self.sent), list(self.actions.done), self.log.end, devices]

@@ -166,7 +166,7 @@ class Network(Medium):
         self.heard += received
 
     def end_period(self) -> list[Transmission]:
-        """What the host sent and received in the period that is over."""
+        """The host's transmissions and receptions in the period that has ended."""
         transmissions = [*self.sent, *of_symbols(self.heard, UP, self.index)]
         self.heard = []
         return transmissions
@@ -198,7 +198,7 @@ class Network(Medium):
 
     @property
     def bit_errors(self) -> int:
-        """Bits that the radio turned over so far, down at every listener and up."""
+        """Bits inverted by the radio so far, down at every listener and up."""
         down = 0
         for listener in self.downlink.listeners.values():
             down += listener.bit_errors

@@ -1,4 +1,4 @@
-"""What a network's host is going to send: frames of the station, a script, and characters that are injected.
+"""The future transmissions of a network's host: frames of the station, a script, and injected characters.
 
 The transmitter is a serial port: one transmission after the other, in the order of their first start bits. A frame of
 the station is dropped and counted while the transmitter is busy; an injected transmission is refused then.
@@ -19,7 +19,7 @@ STATION, INJECTED = 0, 1
 LATEST_TICK = 86_400 * TICKS_PER_SECOND
 """A day: nothing is announced for a later tick."""
 LONGEST_BYTES = 1 << 20
-"""Of one transmission: 18 minutes on the air."""
+"""Longest transmission in bytes: 18 minutes on the air."""
 
 
 class Waiting(msgspec.Struct, frozen=True, gc=False):
@@ -37,7 +37,10 @@ def _split(waiting: Waiting) -> tuple[int, int, int, bytes]:
 
 
 def _made(cells: tuple[int, int, int, bytes]) -> Waiting:
-    """Of network 0; the outbox puts in its own. Raises ValueError for stop bits that are not those of the data."""
+    """A transmission of network 0; the outbox sets its own network.
+
+    Raises ValueError for stop bits that do not match the data.
+    """
     tick, origin, count, text = cells
     data, stops = text[:count], text[count:]
     if len(stops) not in (0, len(data)):
@@ -120,7 +123,7 @@ class Outbox:
         self.waiting.sort(key=_tick)
 
     def end_tick(self, free_tick: int) -> int:
-        """When the transmitter is free after everything that waits."""
+        """Tick at which the transmitter is free after everything that waits."""
         count = len(self.waiting)  # in order, and none overlaps another: the last one ends last
         return max(free_tick, self._end(self.waiting[count - 1].sent)) if count else free_tick
 
@@ -149,7 +152,7 @@ class Outbox:
             self.waiting[place] = Waiting(msgspec.structs.replace(sent, network=self.network), item.origin)
 
     def _end(self, sent: Transmission) -> int:
-        """When the last stop bit is over."""
+        """Tick of the end of the last stop bit."""
         return sent.tick + len(sent.data) * self.character_ticks
 
     def _overlap(self, first: Transmission, second: Transmission) -> bool:

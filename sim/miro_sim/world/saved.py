@@ -27,7 +27,7 @@ _CHECKSUM_BYTES = 32
 
 
 class Identity(NamedTuple):
-    """What a saved world belongs to; hashes in hex."""
+    """The identity of a saved world; hashes in hex."""
 
     tables: str
     scenario: str
@@ -37,7 +37,7 @@ class Identity(NamedTuple):
 
 @cache
 def version() -> str:
-    """Of this program, as it is installed."""
+    """Version of this program, as it is installed."""
     from importlib import metadata  # slow to import
 
     try:

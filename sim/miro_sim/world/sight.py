@@ -1,4 +1,4 @@
-"""What a host measures of its robots' places: an exposure of the world in, measurements out, whole frames late.
+"""A host's measurement of its robots: an exposure of the world in, measurements out, whole frames late.
 
     pixels      robots of all networks -> picture -> tracker -> grabber
     geometric   own robots -> patches through the lens, back through the calibration -> grabber
@@ -36,13 +36,13 @@ from miro_sim.world.robot import Robot
 
 _FRAMES = ("q", 0, 1 << 24)
 WRONG = 3.0
-"""A measurement further off than so many times the worst case of the calibration is wrong."""
+"""A measurement further off than this many times the worst case of the calibration is wrong."""
 SLACK_M = 0.0035
 """Worst case of the tracker itself, and what a robot goes while it is exposed."""
 
 
 class Sight(Protocol):
-    """A camera and all behind it up to the measurement. `frame`: exposures so far."""
+    """A camera and its processing up to the measurement. `frame`: number of exposures so far."""
 
     frame: int
 
@@ -128,7 +128,7 @@ class SeeingSight:
         self.chances.reseed(seed)
 
     def look(self, tick: int) -> list[Sighting | None]:
-        """What the tracker finds in the frame exposed at `tick`."""
+        """The tracker's result for the frame exposed at `tick`."""
         raise NotImplementedError
 
     def expose(self, tick: int) -> Sequence[Posture | None]:
@@ -154,7 +154,7 @@ class SeeingSight:
         return self.grabber.take(sightings)
 
     def _count(self, tick: int, seen: Sightings) -> None:
-        """Compares with the truth, which nobody on the PC can."""
+        """Compares measurements with the true postures, which the PC cannot know."""
         for own in range(len(seen)):
             sighting = seen[own]
             if sighting is None:
@@ -284,7 +284,7 @@ class PixelSight(SeeingSight):
 
 @lru_cache(maxsize=16)
 def calibration_for(camera: keys.SeeingCamera, network: int, seed: int) -> tuple[Calibration, float]:
-    """What a host believes about its camera, and by how much that is wrong at worst over the pitch, in m.
+    """A host's calibration of its camera, and its worst error over the pitch, in m.
 
     Finding the errors of 1997 takes longer than the rest of a world: a seed's calibration is cached.
     """

@@ -1,4 +1,4 @@
-"""What comes in on RXD of a board alone: bytes from a file or a keyboard, as another machine would send them.
+"""The input on RXD of a single board: bytes from a file or a keyboard, as another machine would send them.
 
                     REN is set, a time,           back to back at the line's rate, whatever RI says
                     a text on TXD                 │
@@ -63,7 +63,10 @@ class SerialInput:
         "bit_ticks": ("q", 0, 1 << 40),
     }
     NOT_HASHED = ("pieces",)
-    """What waits to be sent: it may be long, and when it was added changes nothing before it is sent."""
+    """Pieces that wait to be sent.
+
+    They may be long, and the time of their addition changes nothing before they are sent.
+    """
     NOT_STATE = ("seen", "cpu", "baud", "crystal_hz", "gap_ticks", "live", "wait")
 
     def __init__(
@@ -201,7 +204,7 @@ class SerialInput:
 
 
 class PinInput:
-    """Hands `events`, which are in the order of time, to `cpu`. `told(tick, port, levels)` gets each of them too."""
+    """Passes `events`, sorted by time, to `cpu`. `told(tick, port, levels)` is called for each, too."""
 
     STATE = {"done": TICK, "levels": ("4B", 0, 0xFF)}
     NOT_STATE = ("cpu", "events", "told", "uses_rxd")
@@ -289,7 +292,7 @@ class Terminal:
         self.board.input_tick = self.pins.next_tick
 
     def _listening(self, tick: int) -> bool:
-        """What waits for the receiver begins now, not only at the next look."""
+        """The receiver is on: a piece that waits for it begins now, not only at the next call."""
         if not self.input.waits_for_receiver:
             return False
         self.next_feed = 0

@@ -80,11 +80,11 @@ class Waits:
                 self.cursors[index, device.slot] = Cursor(device.log)
 
     def collect(self) -> None:
-        """Takes over what the logs hold, which is not for ever: for who moves the world without a wait."""
+        """Copies new log entries before the ring overwrites them. Call it after moving the world without a wait."""
         self._gather(Watch(self.world, ()))
 
     def pass_over(self) -> None:
-        """What was collected of before the tick of now does not count for the next wait."""
+        """Drops collected events before the present tick, so that the next wait does not see them."""
         self.backlog = [entry for entry in self.backlog if entry[0][0] >= self.world.tick]
         self.ended_tick = -1
 
@@ -130,7 +130,7 @@ class Waits:
         return event
 
     def _forget_followed(self) -> None:
-        """What followers found beyond the end of a wait: those of the next wait find it again."""
+        """Drops matches that followers found beyond the end of a wait: the next wait's followers find them again."""
         self.backlog = [entry for entry in self.backlog if entry[0][3] < FOLLOWED and entry[1].what != "text"]
 
     def _run_piece(self, watch: Watch, until_tick: int) -> None:
@@ -179,7 +179,7 @@ class Waits:
         return tick + 1, []
 
     def _inspectors(self) -> list[Inspector]:
-        """Those with watchers that have to see each instruction once."""
+        """Inspectors with watchers that must see each instruction exactly once."""
         inspectors = [device.board.cpu.inspector for line in self.world.lines for device in line.devices]
         return [inspector for inspector in inspectors if isinstance(inspector, Inspector) and inspector.once]
 

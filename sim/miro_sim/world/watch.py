@@ -1,4 +1,4 @@
-"""What has to be watched for the conditions of one wait: marked addresses, pins, values, text, predicates."""
+"""The observations needed for the conditions of one wait: marked addresses, pins, values, text, predicates."""
 
 from __future__ import annotations
 
@@ -166,7 +166,7 @@ class Watch:
         self.read.append(serial)
 
     def matches(self, entries: Iterable[Entry]) -> list[Entry]:
-        """What the followers make of `entries`, which are new, and of what their boards have kept."""
+        """Matches of the followers in the new `entries`, and in the entries stored by their boards."""
         if not self.followers:
             return []
         pins: list[Change] = []
@@ -199,7 +199,7 @@ class Watch:
         return matches
 
     def save(self) -> Any:
-        """Where the followers are, to go back to with `load`."""
+        """State of the followers, for `load`."""
         return list(self.read), [watch.follower.save() for watch in self.followers]
 
     def load(self, saved: Any) -> None:
@@ -208,7 +208,7 @@ class Watch:
             watch.follower.load(state)
 
     def found(self) -> str:
-        """What the followers have seen instead of what was wanted."""
+        """The state that the followers observed instead of the wanted one."""
         texts = [
             f"{f'{watch.condition.source}: ' if isinstance(watch.condition, OfPin) else ''}{watch.follower.found()}"
             for watch in self.followers
@@ -257,7 +257,7 @@ class Watch:
 
 
 def changes_of(world: Machine, robot_id: tuple[int, int]) -> Changes | None:
-    """What the board of a device keeps of its nets and values; None for one without."""
+    """The changes of a device's nets and values; None if its board does not record any."""
     changes: Changes | None = world.device(*robot_id).changes
     return changes
 

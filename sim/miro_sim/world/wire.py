@@ -35,9 +35,9 @@ _INVERTED, _AT_1 = RXD_STATES.index("inverted"), RXD_STATES.index("1")
 
 
 class BoardAlone(Device):
-    """A board on a wire. `parts`: the keys of those that are on it, by name. `reads`: part and key of each value by
-    its path. `changes`: for who watches it. `line`: of the first of several boards, all of them by their names.
-    `put_stopped`: a put has stopped the run; `run` returns it next.
+    """A board on a wire. `parts`: keys of its parts, by name. `reads`: path -> part and key of each value. `changes`:
+    for its watchers. `line`: of the first of several boards, all of them by their names. `put_stopped`: a put has
+    stopped the run; `run` returns it next.
     """
 
     NOT_STATE = ("sample_ticks", "put_stopped", "parts", "reads", "changes", "line")
@@ -122,7 +122,7 @@ class BoardAlone(Device):
     # Pins
 
     def find_pin(self, name: str) -> PinPlace:
-        """Where the name of a pin leads. Raises ValueError."""
+        """The place of a pin's name. Raises ValueError."""
         device, name = self.at(name)
         netlist = device.board.nets.netlist if isinstance(device.board, WiredBoard) else Netlist()
         return find_pin(device.board.spec, netlist, name)
@@ -267,7 +267,7 @@ class Wire(Medium):
             tick += CHARACTER_BITS * bit
 
     def _takes(self, first_tick: int, end_tick: int, characters: int) -> bool:
-        """True if a transmission comes to the processor."""
+        """True if a transmission reaches the processor."""
         return self.between is None or self.between.takes(first_tick, end_tick, characters)
 
     def _give(self, tick: int, level: int) -> None:
@@ -328,7 +328,7 @@ class Wire(Medium):
         return False
 
     def _sent(self, value: int, tick: int, bits: int, bit_ticks: int) -> None:
-        """The board has sent a character of so many `bits`, whose stop bit begins at `tick`."""
+        """The board has sent a character of `bits` bits, whose stop bit begins at `tick`."""
         first_tick = max(0, tick - bits * bit_ticks)
         if self.between is not None and not self.between.gives(first_tick, tick, bit_ticks):
             return

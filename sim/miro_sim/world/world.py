@@ -191,7 +191,7 @@ class World:
                 self.end_period()
 
     def run_for(self, ticks: int) -> None:
-        """Moves everything on by so many ticks, as `run_to`. Raises ValueError for a negative number."""
+        """Advances everything by `ticks`, like `run_to`. Raises ValueError for a negative number."""
         if ticks < 0:
             raise ValueError(f"ticks = {ticks}: time does not go back")
         self.run_to(self.tick + ticks)
@@ -312,7 +312,7 @@ class World:
             self.in_period = True
 
     def rendezvous(self, tick: int) -> int:
-        """Where everything meets next, going to `tick`."""
+        """The next tick on the way to `tick` at which all parts of the world meet."""
         next_tick = min(tick, (self.index + 1) * self.period_ticks)
         for line in self.lines:
             if line.actions.waiting:
@@ -375,7 +375,7 @@ class World:
             observer(self.last)
 
     def mark(self) -> Mark:
-        """Where the world is, to go back to within the same period."""
+        """A mark of the present state, to go back to within the same period."""
         records = [line.records() for line in self.lines]
         return Mark(self.state.save(), records, [] if self.bodies is None else self.bodies.touching)
 
@@ -412,7 +412,7 @@ class World:
 
     @property
     def state(self) -> Flat:
-        """All that can change in a run, as flat bytes: to save, load, compare and name what differs."""
+        """Everything that can change in a run, as flat bytes: to save, load, compare and name differences."""
         if self._state is None:
             self._state = Flat(self)
         return self._state
@@ -459,7 +459,7 @@ class World:
             line.actions.draw_again(line, self.seed)
 
     def identity(self) -> Identity:
-        """What a saved world must belong to so that this one can load it."""
+        """The identity that a saved world must have so that this one can load it."""
         if self._own is None:
             from miro_sim.scenario.keys import without_expectations
 
