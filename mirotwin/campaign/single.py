@@ -126,7 +126,7 @@ def _failure(run: Run, result: Result) -> str:
         return f"step: {run.player.failure}"
     if result.failures:
         return f"{min(result.failures, key=lambda failure: failure.tick)}"
-    return "; ".join(text for verdict, text in result.said if verdict == "not judged")
+    return "; ".join(text for verdict, text in result.verdict_lines if verdict == "not judged")
 
 
 def _verdicts(expectations: Iterable[Expectation]) -> dict[str, str]:

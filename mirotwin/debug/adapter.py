@@ -439,12 +439,12 @@ class Adapter:
         except BadInput as error:
             self._event("output", category="stderr", output=f"{error}\n")
             why = "step"
-        for cycle, core, text, address in self.its.told:
+        for cycle, core, text, address in self.its.log_outputs:
             begin = self.session.time(cycle * CYCLE_TICKS, core)
             self._event(
                 "output", category="console", output=f"{begin}{text}\n", **self._place(address, "source")
             )
-        self.its.told.clear()
+        self.its.log_outputs.clear()
         self._stopped(why)
 
     def _interrupted(self) -> bool:

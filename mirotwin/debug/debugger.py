@@ -92,7 +92,7 @@ class Debugger:
         self.symbols = symbols
         self.everyone = everyone
         self.breakpoints: list[Breakpoint] = []
-        self.told: list[LogOutput] = []
+        self.log_outputs: list[LogOutput] = []
         self.changed = False
         self.fault_kinds: set[FaultKind] = set()
         self._numbers = 0
@@ -271,7 +271,9 @@ class Debugger:
             if not breakpoint.count(bisect.bisect_left(breakpoint.hits, hit) + 1):
                 return False
         if breakpoint.log is not None:
-            self.told.append(LogOutput(*position, breakpoint.log(Moment(self.symbols, core)), core.cpu.pc))
+            self.log_outputs.append(
+                LogOutput(*position, breakpoint.log(Moment(self.symbols, core)), core.cpu.pc)
+            )
         return breakpoint.log is None
 
     def _count_hits(self) -> bool:
@@ -394,13 +396,13 @@ class Debugger:
         return min((pair for pair in since if pair[0][0] > here[0]), default=None, key=lambda pair: pair[0])
 
     def _forward(self, step: Trap | None = None) -> str:
-        self.told.clear()
+        self.log_outputs.clear()
         here, known = self.timeline.here, self._reported_there
         hit = self._search(self.timeline.find, step)
         # The logs at the place where it stood have been asked again, and were reported when it stopped there.
-        outputs = sorted(output for output in self.told if output[:2] != here or output not in known)
+        outputs = sorted(output for output in self.log_outputs if output[:2] != here or output not in known)
         # Other processors ran on to the end of the piece: what they logged behind the hit comes again later.
-        self.told = [output for output in outputs if hit is None or output[:2] <= hit[:2]]
+        self.log_outputs = [output for output in outputs if hit is None or output[:2] <= hit[:2]]
         fault = self._fault_since(here)
         # The search ends after the piece in which the fault is: a breakpoint before it goes first.
         if fault is not None and (hit is None or fault[0] < hit[:2]):
@@ -408,13 +410,13 @@ class Debugger:
             return f"firmware fault: {fault[1]}"
         if hit is None:
             return self._at_end() or INTERRUPTED
-        self._reported_there = [output for output in self.told if output[:2] == hit[:2]]
+        self._reported_there = [output for output in self.log_outputs if output[:2] == hit[:2]]
         self._stopped_at = hit[:2]
         return _named(hit)
 
     def _back(self) -> str:
         hit = self._search(self.timeline.find_back)
-        self.told.clear()
+        self.log_outputs.clear()
         return self._at_begin() if hit is None else _named(hit)
 
     def _at_begin(self) -> str:

@@ -40,9 +40,9 @@ class Session:
         `instruction`: print the instruction, not the C line.
         """
         self.frame, self.why = 0, why
-        for cycle, core, text, address in self.debugger.told:
+        for cycle, core, text, address in self.debugger.log_outputs:
             self.tell(f"{self.time(cycle * CYCLE_TICKS, core)}{self.symbols.place(address)}: {text}")
-        self.debugger.told.clear()
+        self.debugger.log_outputs.clear()
         cpu = self.debugger.cpu
         line = None if instruction else self.symbols.line(cpu.pc)
         source = "" if line is None else self.symbols.sources.text(line)

@@ -178,7 +178,7 @@ def _judged(
         if here is None or there is None:
             answer = here or there  # the first may be to a number that the robot knew
             if answer is not None and (before is not None or not late):
-                question = f"to question {answer.said.seq}"
+                question = f"to question {answer.item.seq}"
                 yield differs(answer.tick, "answer", here and question, there and question)
             continue
         if late[full] > rule.within_ticks:
@@ -188,7 +188,7 @@ def _judged(
             unsure = max(late[max(0, full - 1 - NEAR) : full + NEAR + 1])
             timely = not sent.near_a_limit(*window, unsure)
             for name, (take, wheel) in FIELDS.items():
-                mine, twins, within = take(before[0].said, here.said), take(before[1].said, there.said), 0.0
+                mine, twins, within = take(before[0].item, here.item), take(before[1].item, there.item), 0.0
                 if wheel is not None:
                     way = sent.rise(slot, wheel, *window) * unsure / LM629_SAMPLE_TICKS / 256
                     within = rule.within_counts + way

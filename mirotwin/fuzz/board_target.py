@@ -165,13 +165,13 @@ class BoardTarget(Target):
         ]
         # Without events where it can be: they take longer to make than a short run.
         if type(monitor).event is SerialMonitor.event:
-            monitor.received = [Character(value, tick, bool(stop)) for value, stop, tick in bus.heard]
-            monitor.sent = [Character(value, tick) for value, tick in bus.said]
+            monitor.received = [Character(value, tick, bool(stop)) for value, stop, tick in bus.received]
+            monitor.sent = [Character(value, tick) for value, tick in bus.sent]
         elif monitor.EVENTS:
-            for value, stop, tick in bus.heard:
+            for value, stop, tick in bus.received:
                 event = Event(tick=tick, what="received", slot=0, value=value, good_stop=bool(stop))
                 happened.append((tick, event))
-            sent = (("transmitted", 0, bus.said), ("heard", PC, getattr(bus, "to_pc", ())))
+            sent = (("transmitted", 0, bus.sent), ("heard", PC, getattr(bus, "to_pc", ())))
             for kind, slot, characters in sent:
                 happened += [
                     (tick, Event(tick=tick, what=kind, slot=slot, value=value)) for value, tick in characters
@@ -190,8 +190,8 @@ class BoardTarget(Target):
         cpu, bus = self.cpu, self.bus
         end = 12 * cpu.cycles + LONGEST_ANSWER_TICKS
         sent = -1
-        while sent != len(bus.said) and 12 * cpu.cycles < end:
-            sent = len(bus.said)
+        while sent != len(bus.sent) and 12 * cpu.cycles < end:
+            sent = len(bus.sent)
             idle = cpu.idle_cycles
             self.machine.run(self.end_tick() + SETTLE_TICKS)
             if bus.fault_kind:

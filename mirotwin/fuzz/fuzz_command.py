@@ -444,14 +444,14 @@ class FuzzProgress(ProgressBar):
         self._line_s = time.monotonic()
 
     def __enter__(self) -> Self:
-        self.to(0.0, said="starting")
+        self.to(0.0, note="starting")
         return self
 
     def show(self, campaign: Campaign) -> None:
         """Draws the line again, or writes one if the last is some time ago."""
         run_s = campaign.run_s
         if self._shown:
-            self.to(min(run_s, self._time_s), said=progress_text(campaign))
+            self.to(min(run_s, self._time_s), note=progress_text(campaign))
         elif not self._quiet and time.monotonic() - self._line_s >= LINE_S:
             self._line_s = time.monotonic()
             left = clock(max(0.0, self._time_s - run_s))
@@ -460,7 +460,7 @@ class FuzzProgress(ProgressBar):
     def _columns(self) -> list[ProgressColumn]:
         from rich.progress import BarColumn, TextColumn, TimeRemainingColumn
 
-        words = [TextColumn(f"{{task.{key}}}", markup=False) for key in ("description", "fields[said]")]
+        words = [TextColumn(f"{{task.{key}}}", markup=False) for key in ("description", "fields[note]")]
         return [*words, BarColumn(bar_width=16), TimeRemainingColumn()]
 
 

@@ -28,7 +28,7 @@ SUMMARY = "summary.json"
 
 
 class CampaignResults:
-    """Results of a finished campaign. `left`: number of inputs not examined; `complete`: it ran for its full time.
+    """Results of a finished campaign. `unexamined`: number of inputs left; `complete`: it ran for its full time.
 
     `in_files`: the checks of --expect that are in a file, by their name, as FILE.py:CLASS; `plugins`: parts of --part.
     """
@@ -36,13 +36,13 @@ class CampaignResults:
     def __init__(
         self,
         campaign: Campaign,
-        left: int,
+        unexamined: int,
         complete: bool,
         in_files: Mapping[str, str],
         plugins: PluginFiles = NO_FILES,
     ) -> None:
         self.campaign = campaign
-        self.left = left
+        self.unexamined = unexamined
         self.complete = complete
         self.in_files = in_files
         self.plugins = plugins
@@ -82,8 +82,8 @@ class CampaignResults:
     def notes(self) -> Iterator[str]:
         """Warnings: inputs not looked at, failures that did not repeat, functions and checks that were not reached."""
         campaign, triage = self.campaign, self.triage
-        if self.left:
-            inputs = amount(self.left, "input of the engine was", "inputs of the engine were")
+        if self.unexamined:
+            inputs = amount(self.unexamined, "input of the engine was", "inputs of the engine were")
             yield f"{inputs} not looked at; a longer --time does"
         if triage.unrepeated:
             yield f"{amount(triage.unrepeated, 'input')} that the engine saw failing did not fail again"
@@ -184,7 +184,7 @@ class CampaignResults:
             "executions": progress.executions,
             "edges": progress.edges,
             "inputs": campaign.inputs,
-            "inputs_left": self.left,
+            "inputs_left": self.unexamined,
             "inputs_judged": campaign.judged,
             "unrepeated": self.triage.unrepeated,
             "lines": msgspec.to_builtins(lines),

@@ -183,12 +183,12 @@ class WiredMachine:
         return self.board.faults[0].tick
 
     @property
-    def heard(self) -> list[tuple[int, int, int]]:
+    def received(self) -> list[tuple[int, int, int]]:
         """Characters that the serial port received: value, bit RB8, tick of RI."""
         return [(value, code, tick) for tick, code, value in self._noted(RECEIVED)]
 
     @property
-    def said(self) -> list[tuple[int, int]]:
+    def sent(self) -> list[tuple[int, int]]:
         """Characters that the serial port sent: value, tick of TI."""
         return [(value, tick) for tick, _, value in self._noted(SENT)]
 

@@ -16,11 +16,11 @@ SAME_TICKS = CONTROL_PERIOD_TICKS // 2
 
 
 class LogEntry(NamedTuple):
-    """Something with a tick; `text` says all of it but when. `said`: the object itself, for more than the text."""
+    """Something with a tick; `text` says all of it but when. `item`: the object itself."""
 
     tick: int
     text: str
-    said: Any = None
+    item: Any = None
 
     def __str__(self) -> str:
         return f"{self.text} at tick {self.tick}"

@@ -150,11 +150,14 @@ def play_at_port(
     return Result(
         path=path,
         verdict=judge(parts),
-        said=[*reported, *(("not observable", line) for line in (*player.unseen, *expected, *notes))],
+        verdict_lines=[
+            *reported,
+            *(("not observable", line) for line in (*player.unseen, *expected, *notes)),
+        ],
         done=player.done,
         steps=player.count,
         tick=tick,
-        left=str(folder) if written else "",
+        folder=str(folder) if written else "",
         left_out=text.notes,
         unseen=player.count - len(player.steps) + len(expected),
     )

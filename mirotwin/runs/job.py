@@ -260,7 +260,9 @@ class Job(msgspec.Struct, frozen=True, kw_only=True):
         verdict = judge(named) if self.case.verdict else checks.verdict()
         why = [line for verdict, line in expectation_lines(checks) if verdict != "failed"]
         outcome = result_of_case(self.case.verdict, checks.failures, self.case.changed, verdict, why)
-        return replace(result, verdict=outcome.verdict, said=outcome.said, failures=outcome.failures)
+        return replace(
+            result, verdict=outcome.verdict, verdict_lines=outcome.verdict_lines, failures=outcome.failures
+        )
 
     def judge_case(self, progress: Callable[[int], object] = lambda tick: None) -> Result:
         """Runs a case, or a stream without expectations, to its verdict. Raises BadInput."""

@@ -24,18 +24,18 @@ Line = tuple[Verdict, str]
 
 
 class Result(msgspec.Struct, frozen=True, kw_only=True):
-    """`said`: a line for each part that failed, or could not be judged; `failures`: of checks, in the order of time.
+    """The result of a run. `verdict_lines`: a line for each part that failed or could not be judged.
 
-    `expectations`: of all checks. `done` of `steps`; `unseen`: steps and expectations that no port shows. `tick`: where
-    the run ended; `clock`: ticks per second. `left`: the folder with its case; `left_out`: what settings left out,
-    a line each. `again`: the command that gives the verdict again; `error`: why there was no run. `has_page`: whether
-    `mirotwin report` makes a page of it. `step_tick`: where a step failed, -1 if none did. `place`: the C line at which
-    the debugger stands at what failed first. `commands`: those that play the failure again and stand at it.
+    `failures`: of checks, in the order of time. `expectations`: of all checks. `done` of `steps`; `unseen`: number of
+    steps and expectations that a port does not show. `tick`: end of the run; `clock`: ticks per second. `folder`: with
+    its case, "" if none; `left_out`: keys that settings left out, a line each. `again`: the command that repeats the
+    verdict; `error`: why there was no run. `has_page`: `mirotwin report` can make a page of it. `step_tick`: of a
+    failed step, -1 if none. `place`: the C line of the first failure. `commands`: replay the failure and debug it.
     """
 
     path: str = ""
     verdict: Verdict
-    said: Sequence[Line] = ()
+    verdict_lines: Sequence[Line] = ()
     failures: Sequence[Failure] = ()
     expectations: Sequence[Expectation] = ()
     done: int = 0
@@ -46,7 +46,7 @@ class Result(msgspec.Struct, frozen=True, kw_only=True):
     seed: int = 0
     digest: str = ""
     firmware_sha256: str = ""
-    left: str = ""
+    folder: str = ""
     left_out: Sequence[str] = ()
     again: str = ""
     error: Exception | None = None
@@ -84,12 +84,12 @@ class Result(msgspec.Struct, frozen=True, kw_only=True):
     @property
     def texts(self) -> tuple[str, ...]:
         """All lines."""
-        return tuple(text for _, text in self.said)
+        return tuple(text for _, text in self.verdict_lines)
 
     @property
     def lines(self) -> tuple[str, ...]:
         """Lines about failures, firmware faults first."""
-        wrong = [line for line in self.said if VERDICTS[line[0]].junit in ("failure", "error")]
+        wrong = [line for line in self.verdict_lines if VERDICTS[line[0]].junit in ("failure", "error")]
         return tuple(text for _, text in sorted(wrong, key=lambda line: line[0] != "fault"))
 
     @property
@@ -183,4 +183,4 @@ def result_of_case(
 
 
 def _case(verdict: Verdict, lines: Sequence[str], failures: Sequence[Failure] = ()) -> Result:
-    return Result(verdict=verdict, said=[(verdict, line) for line in lines], failures=failures)
+    return Result(verdict=verdict, verdict_lines=[(verdict, line) for line in lines], failures=failures)

@@ -200,7 +200,7 @@ class Run:
         return Result(
             path=self.spec.origin,
             verdict=judge(parts),
-            said=lines,
+            verdict_lines=lines,
             failures=[failure for group in self.judges for failure in group.failures],
             expectations=[verdict for group in self.judges for verdict in group.verdicts()],
             done=0 if player is None else player.done,

@@ -63,7 +63,9 @@ def run_test(
     try:
         return _run(path, firmware, seed, settings, folder, again, desk)
     except NotObservable as error:
-        return Result(path=path, verdict="not observable", said=[("not observable", f"{error}")], seed=seed)
+        return Result(
+            path=path, verdict="not observable", verdict_lines=[("not observable", f"{error}")], seed=seed
+        )
     except (DomainError, PluginError, OSError) as error:
         return cannot_be_run(path, BadInput(path, "", f"cannot be run: {error}"), seed, error)
     except BadInput as error:
@@ -71,7 +73,9 @@ def run_test(
 
 
 def cannot_be_run(path: str, bad: BadInput, seed: int = 0, error: Exception | None = None) -> Result:
-    return Result(path=path, verdict="error", said=[("error", f"{bad}")], seed=seed, error=error or bad)
+    return Result(
+        path=path, verdict="error", verdict_lines=[("error", f"{bad}")], seed=seed, error=error or bad
+    )
 
 
 def _run(
@@ -121,13 +125,17 @@ def _with_artifacts(run: Run, case: str | None, result: Result, folder: Path, te
             files = stream_files(case, run.stream(), run.spec.image)
             leave(folder, "\n".join((*lines, "")), {SCENARIO: encodable(text.text).encode(), **files})
             commands = case_lines(str(folder), FIRMWARE not in files) if CASE in files else ()
-            return replace(result, left=str(folder), commands=commands)
+            return replace(result, folder=str(folder), commands=commands)
     except (OSError, BadInput) as error:  # the verdict stands, whatever becomes of its files
         with suppress(OSError, BadInput):
             clear(folder, SCENARIO)
         saves = run.player is not None and run.player.saved
         verdict = "error" if saves and not failed else result.verdict
-        return replace(result, verdict=verdict, said=[*result.said, ("passed", nothing_left(folder, error))])
+        return replace(
+            result,
+            verdict=verdict,
+            verdict_lines=[*result.verdict_lines, ("passed", nothing_left(folder, error))],
+        )
     return result
 
 

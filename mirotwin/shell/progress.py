@@ -40,17 +40,17 @@ class ProgressBar:
         if self._progress is not None:
             self._progress.stop()
 
-    def to(self, done: float, said: str = "") -> None:
-        """Moves the bar to `done`; cheap enough to call every control period. `said`: text of the bar's text column."""
+    def to(self, done: float, note: str = "") -> None:
+        """Moves the bar to `done`; cheap enough to call every control period. `note`: text of the bar's text column."""
         if not self._shown:
             return
         if self._progress is None:
             if time.monotonic() - self._began_s < self.PATIENCE_S:
                 return
             self._progress = self._bar()
-            self._progress.add_task(self.what, total=self.total, completed=self.begun, said="")
+            self._progress.add_task(self.what, total=self.total, completed=self.begun, note="")
             self._progress.start()
-        self._progress.update(self._progress.task_ids[0], completed=done, said=said or self._rate(done))
+        self._progress.update(self._progress.task_ids[0], completed=done, note=note or self._rate(done))
 
     def _bar(self) -> Progress:
         from rich.console import Console  # loaded when the first bar is drawn: most commands are over before
@@ -61,7 +61,7 @@ class ProgressBar:
     def _columns(self) -> list[ProgressColumn]:
         from rich.progress import BarColumn, TaskProgressColumn, TextColumn, TimeRemainingColumn
 
-        words, rate = (TextColumn(f"{{task.{key}}}", markup=False) for key in ("description", "fields[said]"))
+        words, rate = (TextColumn(f"{{task.{key}}}", markup=False) for key in ("description", "fields[note]"))
         return [words, BarColumn(), TaskProgressColumn(), rate if self.unit else TimeRemainingColumn()]
 
     def _rate(self, done: float) -> str:

@@ -52,7 +52,7 @@ class PortRig:
         names = self.spec.scenario.expect
         lines = [why_not(self.machine, f"expectation {name}", "inside") for name in names]
         reported: list[Line] = [("not observable", line) for line in (*lines, *self.notes)]
-        return Result(verdict="passed", said=reported, tick=self.tick)
+        return Result(verdict="passed", verdict_lines=reported, tick=self.tick)
 
     def located(self, caught: BaseException | None, result: Result) -> Result:
         """The result unchanged: a port does not show which C line a robot executes."""

@@ -54,7 +54,7 @@ class ScenarioItem(pytest.Item):
         if result.verdict == "not observable":
             pytest.skip("; ".join(result.notes))
         if result.verdict != "passed":
-            artifacts = [f"left in {relative(Path(result.left))}"] if result.left else []
+            artifacts = [f"left in {relative(Path(result.folder))}"] if result.folder else []
             raise ScenarioFailed(
                 "\n".join((*result.lines, *result.notes, f"again: {result.again}", *artifacts))
             )

@@ -93,9 +93,9 @@ def test(options: TestOptions) -> int:
         left_out |= dict.fromkeys(result.left_out)
         if not options.as_json:
             _show(result, options)
-        if options.pages and result.left and result.has_page:
+        if options.pages and result.folder and result.has_page:
             try:
-                leave_page(Path(result.left))
+                leave_page(Path(result.folder))
             except (OSError, BadInput) as error:
                 (complain if options.as_json else show_line)(f"    no page: {error}")
     reported = Results(command="test", cases=cases, verdict=judge(result.verdict for result in results))
@@ -130,14 +130,14 @@ def _show(result: Result, options: TestOptions) -> None:
     show_line(f"{VERDICTS[result.verdict].line}  {result.path}{how}")
     for line in (*result.lines, *result.notes):
         show_line(f"    {line}")
-    if result.left:
-        show_line(f"    left in {result.left}")
+    if result.folder:
+        show_line(f"    left in {result.folder}")
         for line in result.commands:
             show_line(f"    {line}")
         if result.has_page:
-            show_line(f"    {report_line(result.left)}")
+            show_line(f"    {report_line(result.folder)}")
     if not passed and result.verdict != "error":
-        if result.done < result.steps and not result.left and (line := options.debug_line_for(result.path)):
+        if result.done < result.steps and not result.folder and (line := options.debug_line_for(result.path)):
             show_line(f"    {line}")
         show_line(f"    {result.again}")
 

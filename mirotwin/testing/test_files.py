@@ -44,7 +44,11 @@ def run_sanitized(
             lines.append((verdict, f"    {line}"))
     used = [entry for entry in allowed if entry not in stale]
     verdict = judge((result.verdict, *(verdict for verdict, _ in lines)))
-    return replace(result, verdict=verdict, said=[*result.said, *lines]), used, [*watching.unseen]
+    return (
+        replace(result, verdict=verdict, verdict_lines=[*result.verdict_lines, *lines]),
+        used,
+        [*watching.unseen],
+    )
 
 
 def run_file(options: TestOptions, file: str) -> Result:
@@ -87,6 +91,6 @@ def _as_test(path: str, result: Result) -> Result:
     """The result of a case as a test: it passes if its check passes, on any firmware."""
     if result.verdict in ("passed", "differs"):
         notes: list[Line] = [("passed", text) for text in result.texts[1:]]
-        return replace(result, path=path, verdict="passed", said=notes)
+        return replace(result, path=path, verdict="passed", verdict_lines=notes)
     lines: list[Line] = [("failed", f"expectation failed: {failure}") for failure in result.failures]
-    return replace(result, path=path, said=lines or result.said)
+    return replace(result, path=path, verdict_lines=lines or result.verdict_lines)

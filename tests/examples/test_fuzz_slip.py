@@ -79,7 +79,7 @@ def test_the_firmware_answers_what_the_format_says(images, name):
         (b"\x01\x03\x00", None),  # no such lamp
     ):
         assert dimmer.run(bytes([len(body) - 1]) + body) == 0
-        sent = bytes(value for value, _ in dimmer.bus.said)
+        sent = bytes(value for value, _ in dimmer.bus.sent)
         assert sent == (b"" if answer is None else slip().encode(answer))
     dimmer.run(b"\x02\x01\x02\x64")
     assert dimmer.subject.memory["level"] == [0, 0, 100]

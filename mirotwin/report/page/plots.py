@@ -107,7 +107,7 @@ def _wheel(tracks: PageTracks, times: Any, side: str) -> Any:
     for number, robot in enumerate(tracks.robots):
         wheel, fine = robot.wheels[side], robot.fine[side]
         period_times = seconds_at(tracks.ticks)
-        columns = {name: np.array(getattr(wheel, name)) for name in ("told", "actual")}
+        columns = {"told": np.array(wheel.commanded), "actual": np.array(wheel.actual)}
         source = ColumnDataSource({"t": period_times, **columns})
         of_profile = (fine.times_s, fine.values) if len(fine.values) else (period_times, wheel.profile)
         profile = ColumnDataSource({"t": np.array(of_profile[0]), "profile": np.array(of_profile[1])})

@@ -78,7 +78,7 @@ def _course(answers: Sequence[LogEntry], channel: str) -> list[int]:
     """The channel from answer to answer; increments are summed."""
     take, _ = FIELDS[channel]
     if channel == "flags":
-        return [int(answer.said.flags) for answer in answers]
+        return [int(answer.item.flags) for answer in answers]
     return list(
-        accumulate((take(answer.said, other.said) for answer, other in pairwise(answers)), initial=0)
+        accumulate((take(answer.item, other.item) for answer, other in pairwise(answers)), initial=0)
     )[: len(answers)]

@@ -31,16 +31,16 @@ _WRAP = 1 << 32
 class WheelTrack:
     """One wheel: speeds in m/s at the nominal radius.
 
-    `told`: commanded by the host, `profile`: of the LM629, `actual`: measured.
+    `commanded`: by the host, `profile`: of the LM629, `actual`: measured.
     """
 
     def __init__(self) -> None:
-        self.told, self.profile, self.actual = column(), column(), column()
+        self.commanded, self.profile, self.actual = column(), column(), column()
         self._position: int | None = None
 
     def add(self, axis: Axis, commanded: int | None) -> None:
         before, self._position = self._position, axis.real_position
-        self.told.append(NAN if commanded is None else commanded / UNITS_PER_COUNT * M_S_PER_COUNT)
+        self.commanded.append(NAN if commanded is None else commanded / UNITS_PER_COUNT * M_S_PER_COUNT)
         self.profile.append(axis.desired_velocity * _VELOCITY_SCALE)
         again = any(opcode in _SETS_POSITION for _, opcode, _ in axis.commands)
         if before is None or again:

@@ -7,7 +7,7 @@ cdef long long NEVER_TICK, STOPPED_TICK, _LONGEST
 
 cdef class RecordingBus(XramBus):
     cdef public Cpu cpu
-    cdef readonly list heard, said, resets
+    cdef readonly list received, sent, resets
     cdef public int fault_kind
     cdef readonly int fault_pc
     cdef readonly long long fault_tick

@@ -14,17 +14,17 @@ LONGEST_ANSWER_TICKS = 24_000_000
 """Longest continuation of a run, after the firmware has gone to sleep, while it still sends; in ticks."""
 _LONGEST = LONGEST_ANSWER_TICKS
 _KEPT = 4096  # characters of each direction
-_NO_FAULT = 1  # what a `BareOracle` finds
+_NO_FAULT = 1  # failure code of a `BareOracle`
 
 
 class RecordingBus(XramBus):
-    """Keeps the first 4096 characters of each direction since `begin`, and the first fault, which stops the CPU.
+    """Records the first 4096 characters of each direction since `begin`, and the first fault, which stops the CPU.
 
-    `heard`: what the serial port received: value, bit RB8 (the stop bit in mode 1), tick of RI. `said`: what it sent:
-    value, tick of TI.
+    `received`: characters that the serial port received: value, bit RB8 (the stop bit in mode 1), tick of RI. `sent`:
+    characters that it sent: value, tick of TI.
     """
 
-    NOT_STATE = ("cpu", "heard", "said", "fault_kind", "fault_pc", "fault_tick", "resets")
+    NOT_STATE = ("cpu", "received", "sent", "fault_kind", "fault_pc", "fault_tick", "resets")
 
     def __init__(self) -> None:
         XramBus.__init__(self)
@@ -34,19 +34,19 @@ class RecordingBus(XramBus):
         self.begin()
 
     def begin(self) -> None:
-        """Forgets what it kept."""
-        self.heard: list[tuple[int, int, int]] = []
-        self.said: list[tuple[int, int]] = []
+        """Clears the records."""
+        self.received: list[tuple[int, int, int]] = []
+        self.sent: list[tuple[int, int]] = []
         self.fault_kind = 0
         self.resets: list[int] = []  # when the reset pin went down
 
     def byte_received(self, value: int, stop: int, tick: int) -> None:
-        if len(self.heard) < _KEPT:
-            self.heard.append((value, stop, tick))
+        if len(self.received) < _KEPT:
+            self.received.append((value, stop, tick))
 
     def byte_sent(self, value: int, tick: int) -> None:
-        if len(self.said) < _KEPT:
-            self.said.append((value, tick))
+        if len(self.sent) < _KEPT:
+            self.sent.append((value, tick))
 
     def fault(self, kind: int, pc: int, tick: int) -> None:
         if self.fault_kind == 0:

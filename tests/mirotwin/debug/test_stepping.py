@@ -189,12 +189,12 @@ def test_a_log_where_another_breakpoint_stops_tells_each_time_once(debugger, log
     pair[0 if log_first else 1].log = lambda moment: "tick"
     for _ in range(3):
         debugger.move("continue")
-        assert [(one.cycle, one.text) for one in debugger.told] == [(debugger.cpu.cycles, "tick")]
+        assert [(one.cycle, one.text) for one in debugger.log_outputs] == [(debugger.cpu.cycles, "tick")]
     third = debugger.cpu.cycles
     debugger.move("rcontinue")
     second = debugger.cpu.cycles
     debugger.move("continue")
-    assert [one.cycle for one in debugger.told] == [second, third]
+    assert [one.cycle for one in debugger.log_outputs] == [second, third]
 
 
 def test_counted_hits_are_those_of_the_whole_run_after_an_interruption(debugger):

@@ -61,7 +61,7 @@ def test_a_run_says_steps_checks_and_faults_in_this_order_and_lists_faults_first
 
 def test_several_faults_of_a_robot_are_one_line():
     run = Run(spec("stop_on_fault=false", image=image_of(FAULTS), until_tick=CONTROL_PERIOD_TICKS)).play()
-    (line,) = (text for verdict, text in run.result().said if verdict == "fault")
+    (line,) = (text for verdict, text in run.result().verdict_lines if verdict == "fault")
     assert line.endswith(" more)")
 
 

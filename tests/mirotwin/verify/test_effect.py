@@ -35,7 +35,7 @@ def result(steps, **changes):
 )
 def test_a_fault_that_changes_something_leaves_the_verdict_to_the_checks(what):
     found = result(f'{DRIVES}, {{ fault = "{what}" }}, {GOES_ON}')
-    assert not any(verdict == "not judged" for verdict, _ in found.said)
+    assert not any(verdict == "not judged" for verdict, _ in found.verdict_lines)
 
 
 @pytest.mark.parametrize(

@@ -39,11 +39,11 @@ class Counted(Protocol, frozen=True, tag="counted"):
 
 
 def received(target):
-    return [Character(value, tick, bool(stop)) for value, stop, tick in target.bus.heard]
+    return [Character(value, tick, bool(stop)) for value, stop, tick in target.bus.received]
 
 
 def sent(target):
-    return [Character(value, tick) for value, tick in target.bus.said]
+    return [Character(value, tick) for value, tick in target.bus.sent]
 
 
 def text(characters):

@@ -56,14 +56,14 @@ def test_an_input_does_on_the_target_what_it_does_in_a_world_from_power_on(car, 
     end_tick = car.end_tick()
     values = car.machine.device.values()
     here = cpu_of(car.machine.board)
-    said = car.machine.said
+    sent = car.machine.sent
     run = BoardOracle(car, {}).rerun(data, {}, end_tick)
     there = run.world.devices[0]
     assert cpu_of(there.board) == here
     assert there.values() == values
     begun = car.harness.begin_tick
     events = [there.board.log.event(serial) for serial in range(there.board.log.end)]
-    assert [(value, tick) for tick, kind, _, value, _ in events if kind == 1 and tick > begun] == said
+    assert [(value, tick) for tick, kind, _, value, _ in events if kind == 1 and tick > begun] == sent
 
 
 def test_inputs_begin_where_the_waits_of_a_scenario_end(car):
@@ -113,7 +113,7 @@ def test_a_number_between_two_that_bits_choose_becomes_the_nearer_also_beside_wo
 def test_a_run_leaves_nothing_to_the_next(car):
     def outcome(data):
         car.run(data)
-        return cpu_of(car.machine.board), car.machine.said, car.machine.device.values()
+        return cpu_of(car.machine.board), car.machine.sent, car.machine.device.values()
 
     begins = b"\x09\x00?\x0b\x10"
     first = outcome(begins)
@@ -148,7 +148,7 @@ def test_an_input_puts_levels_on_pins_that_nothing_drives_and_a_stream_does_so_t
     character = b"\x09\x00A\x0a\x20"
     data = character + low + character + high + character
     target.run(data)
-    assert [value for value, _ in target.machine.said] == [0xC1, 0x41, 0xC1]
+    assert [value for value, _ in target.machine.sent] == [0xC1, 0x41, 0xC1]
     assert [line.split(": ")[1] for line in target.describe(data).splitlines()] == [
         *("41", "P1.3 = 0", "41", "P1.3 = 1", "41"),
     ]  # fmt: skip

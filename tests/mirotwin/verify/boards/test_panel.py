@@ -133,7 +133,7 @@ def test_what_is_put_holds_from_then_on(verb, tmp_path):
 @pytest.mark.parametrize("step", FAILS)
 def test_a_step_that_fails_says_what_was_there_and_leaves_a_case_with_this_verdict(step, tmp_path):
     result = outcome(tmp_path, READY + step, artifacts=tmp_path / "left")
-    assert result.verdict == "failed", result.said
+    assert result.verdict == "failed", result.verdict_lines
     assert re.search(FAILS[step], result.lines[0]), result.lines
     folder = tmp_path / "left"
     (case,) = folder.rglob("*.stream")
@@ -177,7 +177,7 @@ ASKS = r'{ wait_for = "text", text = "ready\r\n" }, { send = "text", text = "?" 
 @pytest.mark.parametrize("expect", PASS)
 def test_a_check_that_holds_has_passed(expect, tmp_path):
     result = outcome(tmp_path, ASKS, expect)
-    assert (result.verdict, result.said) == ("passed", [])
+    assert (result.verdict, result.verdict_lines) == ("passed", [])
 
 
 FAIL = {
@@ -212,7 +212,7 @@ def test_a_check_that_fails_says_what_was_found_and_leaves_a_case(expect, tmp_pa
     (case,) = (tmp_path / "left").rglob("case.stream")
     (image,) = (tmp_path / "left").rglob("*.ihx")
     again = run_file(TestOptions(paths=(str(case),), firmware=str(image)), str(case))
-    assert (again.verdict, again.lines[:1]) == ("failed", result.lines[:1]), again.said
+    assert (again.verdict, again.lines[:1]) == ("failed", result.lines[:1]), again.verdict_lines
 
 
 def test_a_check_without_an_occasion_has_not_passed(tmp_path):
@@ -239,7 +239,7 @@ def test_a_check_without_an_occasion_has_not_passed(tmp_path):
 def test_what_no_check_can_judge_is_one_line(expect, message, tmp_path):
     result = outcome(tmp_path, "", expect)
     assert result.verdict in ("error", "not observable")
-    assert message in result.said[0][1]
+    assert message in result.verdict_lines[0][1]
 
 
 WRONG = {
@@ -269,7 +269,7 @@ WRONG = {
 def test_what_is_wrong_with_a_step_is_one_line_with_its_place(steps, tmp_path):
     result = outcome(tmp_path, steps)
     assert result.verdict == "error"
-    assert WRONG[steps] in result.said[0][1]
+    assert WRONG[steps] in result.verdict_lines[0][1]
 
 
 @pytest.mark.parametrize(
