@@ -209,7 +209,7 @@ def test_an_axis_never_shows_rounding_noise():
     robot.v_m_s = robot.w_rad_s = noise
     robot.told_v_m_s = robot.told_w_rad_s = nothing
     for wheel in robot.wheels.values():
-        wheel.told, wheel.profile, wheel.actual = nothing, noise, noise
+        wheel.commanded, wheel.profile, wheel.actual = nothing, noise, noise
     made = figures_of(PageTracks(0, ticks, [robot]), [], [])
     for name, least in (("v", LEAST_M_S), ("w", LEAST_RAD_S), ("left", LEAST_M_S), ("right", LEAST_M_S)):
         columns = [(one.glyph.y, one.data_source.data) for one in made[f"plot-{name}"].renderers]
