@@ -194,7 +194,7 @@ def _atan(a: float, more: float, supplement: bool) -> float:
 
 
 def _lost(q: float, y: float, x: float) -> float:
-    """What the rounded quotient q = y / x of positive numbers lost: y / x - q (Dekker's exact product)."""
+    """Rounding error of the quotient q = y / x of positive numbers: y / x - q (Dekker's exact product)."""
     if not (1e-140 < y < 1e140 and 1e-140 < x < 1e140 and q > 1e-140):
         return 0.0  # the split below would leave the range of float64
     # Halves of 26 bits (Veltkamp): the four products of halves are exact, and so is their sum in this order.

@@ -30,7 +30,7 @@ _BEGIN = b'{"mirotwin_campaign":'
 
 
 def journal_path(results: Path) -> Path:
-    """Where the outcomes of unfinished results stand: noise.part.jsonl for noise.parquet."""
+    """Path of the journal of unfinished results: noise.part.jsonl for noise.parquet."""
     return results.with_suffix(".part.jsonl")
 
 

@@ -1,4 +1,4 @@
-"""What rules came to, for programs: each a case of the results that JUnit and JSON are written from."""
+"""The results of rules for programs: each rule is a case in JUnit and JSON."""
 
 from __future__ import annotations
 
@@ -73,7 +73,7 @@ class RuleCases:
         return judge(verdicts)
 
     def found(self, finding: Finding, rule: str, reproduce: str) -> TestCase:
-        """What the sanitizer found in the trial of a rule. `reproduce`: the command that leaves the trial."""
+        """A finding of the sanitizer in the trial of a rule. `reproduce`: the command that leaves the trial."""
         assert self._image is not None
         facts: dict[str, str | int | float] = {"rule": rule, "network": finding.network}
         if finding.slot >= 0:
@@ -151,7 +151,7 @@ class RuleCases:
         )
 
     def _commands(self, case: str) -> Sequence[str]:
-        """Those of a case, if it was left."""
+        """The commands for a case, if there is one."""
         folder = self._artifacts
         if folder is None or not (folder / case).exists():
             return ()

@@ -57,7 +57,7 @@ _QUIET = (
     "completions", "dataBreakpointInfo", "disassemble", "evaluate", "readMemory", "scopes", "stackTrace", "threads",
     "variables",
 )  # fmt: skip
-"""What an editor asks by itself, or shows in its place: a failure of these needs no window of its own."""
+"""Requests that an editor sends on its own, or whose result it shows in place: their failure must not open a window."""
 _MOST_FRAMES = 1000
 _MOST_LOG, _MOST_TERMS = 4096, 32  # characters and expressions of a message
 _IN_BRACES = re.compile(r"\{([^{}]*)\}")
@@ -258,7 +258,7 @@ class Adapter:
         return {"breakpoints": [{"verified": is_known} for is_known in known]}
 
     def on_exceptionInfo(self, given: Message) -> Message:
-        """The fault, or the failed check of a case, at which it stands."""
+        """The firmware fault or the case's failed check at the present moment."""
         if _REASONS.get(self.why.partition(" ")[0]) != "exception":
             raise BadInput("", "exceptionInfo", "it does not stand at a fault or a failed check")
         kind = next((kind.name for kind, words in DESCRIPTIONS.items() if words in self.why), "failed check")
@@ -275,7 +275,7 @@ class Adapter:
         return {"breakpoints": [{"line": line} for line in sorted(there.intersection(wanted))]}
 
     def on_gotoTargets(self, given: Message) -> Message:
-        """Where a line is executed next: the run goes on to it, as nothing can be jumped over."""
+        """The next execution of a line: the run continues to it, because no instruction can be skipped."""
         path = given["source"].get("path") or given["source"].get("name") or ""
         addresses, line = self.symbols.at_line(path, given["line"])
         return {
@@ -371,7 +371,7 @@ class Adapter:
         }
 
     def _named(self, path: str, moment: Moment, written: Bytes) -> str:
-        """What means the same in all functions and files, "" where it has no such name."""
+        """A name that is valid in all functions and files; "" if there is none."""
         parts = _PATH.fullmatch(path)
         with suppress(BadInput):
             if parts is not None and (scope := moment.scope_of(parts[2], parts[1] or "")) is not None:
@@ -404,7 +404,7 @@ class Adapter:
         return threads.index(number)
 
     def _watched_run(self, run: Callable[[], object]) -> None:
-        """Something that may take long: after a second it is said to be under way."""
+        """Runs a function that may take long; after a second it is reported as running."""
         self.paused = False
         self.progress_at_s = time.monotonic() + _PATIENCE_S
         try:
@@ -417,7 +417,7 @@ class Adapter:
             self.progress = -abs(self.progress)
 
     def _tell_progress(self) -> None:
-        """Where the run is, of its whole length."""
+        """Reports the position in the run and its length."""
         now_s = time.monotonic()
         if not self.shows_progress or not self.progress_at_s or now_s < self.progress_at_s:
             return
@@ -448,7 +448,7 @@ class Adapter:
         self._stopped(why)
 
     def _interrupted(self) -> bool:
-        """Answers what comes during a run; true where that ends it."""
+        """Answers requests that come during a run; True if one ends the run."""
         if self.began:
             self._tell_progress()
         # {}: nothing has come; None: the client has gone, and the run must not go on without it.

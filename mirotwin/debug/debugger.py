@@ -1,7 +1,7 @@
-"""What a debugger does with a timeline: breakpoints, steps by line and by instruction, the last writer; both ways.
+"""Debugs a timeline in both directions: breakpoints, steps by line and by instruction, search for the last writer.
 
-A step by line stops where another C line begins. A search runs at full speed from mark to mark; a frame is told by SP
-and the static height of the instruction, so calls and interrupts in between cost little.
+A step by line stops where another C line begins. A search runs at full speed from mark to mark; a frame is identified
+by SP and the static height of the instruction, so calls and interrupts in between cost little.
 """
 
 from __future__ import annotations
@@ -62,7 +62,7 @@ class Breakpoint(msgspec.Struct, eq=False):
 
 
 class LogOutput(NamedTuple):
-    """What a log says, and where."""
+    """Text of a log, with its cycle, processor and address."""
 
     cycle: int
     core: int
@@ -80,11 +80,11 @@ class _Line(NamedTuple):
 
 
 class Debugger:
-    """Of one run. `everyone`: breakpoints are for all processors, else for the one in focus.
+    """The debugger of one run. `everyone`: breakpoints are for all processors, else for the one in focus.
 
-    `fault_kinds`: firmware faults at which it stops also where the run goes on past them.
-    `changed`: set by who changes breakpoints while it searches, which then goes on with them.
-    What stopped it is returned as a text: "breakpoint 1", "step", "the run ends here".
+    `fault_kinds`: firmware faults at which it stops although the run continues past them. `changed`: set by the caller
+    that changes breakpoints during a search, which then uses them. The reason of a stop is returned as a text:
+    "breakpoint 1", "step", "the run ends here".
     """
 
     def __init__(self, timeline: Timeline, symbols: Symbols, everyone: bool = False) -> None:
@@ -168,7 +168,10 @@ class Debugger:
         return self.breakpoints[-1]
 
     def bytes_of(self, text: str, place: Value | None = None, read: bool = False) -> Bytes:
-        """Where `text` lies. Raises NoValue for what lies in no memory that is written, or is only `read`."""
+        """Addresses of the value of `text`.
+
+        Raises NoValue for a value outside of writable memory (readable memory with `read`).
+        """
         value = place or expression(text)(self.moment())
         space, address, size = value.space, value.address, value.kind.size if value.kind else 0
         mask = -1
@@ -187,7 +190,10 @@ class Debugger:
         return Bytes(space, address, size, mask)
 
     def _writers(self, written: Bytes) -> Collection[int]:
-        """Where instructions may write it. What pushes beside the stack is a firmware fault, and not looked for."""
+        """Addresses of instructions that may write it.
+
+        Pushes outside of the stack are firmware faults, and not searched.
+        """
         if self.timeline.code_in_ram:
             return self.timeline.everywhere
         on_stack = self._is_on_stack(written)
@@ -197,7 +203,7 @@ class Debugger:
         return writers | self.symbols.unwinder.vectors if pushed else writers
 
     def _readers(self, read: Bytes) -> Collection[int]:
-        """Where instructions may read it."""
+        """Addresses of instructions that may read it."""
         if self.timeline.code_in_ram:
             return self.timeline.everywhere
         return read.readers(self.symbols.image.code, self.symbols.instructions, self._is_on_stack(read))
@@ -226,7 +232,7 @@ class Debugger:
         return read or (access != "read" and self._writes(watched, cpu))
 
     def _traps(self, step: Trap | None = None) -> dict[int, Trap]:
-        """What a search asks: the breakpoints, and `step` of the processor in focus."""
+        """The traps of a search: the breakpoints, and `step` for the processor in focus."""
         places = frozenset[int]().union(*(breakpoint.addresses for breakpoint in self.breakpoints))
 
         def ask(core: Core) -> object:
@@ -277,9 +283,9 @@ class Debugger:
         return breakpoint.log is None
 
     def _count_hits(self) -> bool:
-        """Counts the hits from the start of the run up to now, where a breakpoint asks for their number.
+        """Counts the hits from the start of the run up to now, if a breakpoint needs their number.
 
-        False where that was interrupted.
+        False if interrupted.
         """
         for point in self.breakpoints:
             if point.count is not None and point.counted_to < self.timeline.tick:
@@ -322,12 +328,12 @@ class Debugger:
         return self._forward(Trap(addresses, lambda core: True))
 
     def go_to(self, tick: int) -> str:
-        """To a tick, or as near as the processor comes to it after it. A long way can be interrupted."""
+        """Goes to a tick, or to the first moment of the processor after it. A long search can be interrupted."""
         reached = self.timeline.go_to(tick, self.timeline.interrupted)
         return self._at_end() or ("goto" if reached else INTERRUPTED)
 
     def until(self, condition: Condition) -> str:
-        """On to an event; what it says of itself."""
+        """Runs to an event; returns its text."""
         event = self.timeline.until(condition)
         if event is not None:
             text = str(event)
@@ -366,7 +372,7 @@ class Debugger:
     def _search(
         self, seek: Callable[[Mapping[int, Trap], Position], Hit | None], step: Trap | None = None
     ) -> Hit | None:
-        """To what stops, by `seek`."""
+        """Runs `seek` to the next stop."""
         here, interrupted = self.timeline.here, self.timeline.interrupted
         if step is not None and here[0] == self._stopped_at[0]:
             here = max(here, self._stopped_at)  # of another processor, in the same cycle
@@ -489,7 +495,7 @@ class Debugger:
         return _Line(self.symbols.unwinder.base(cpu), self.symbols.line(cpu.pc), level, begins)
 
     def _line(self, over: bool, later: bool = False) -> str:
-        """On to where another line begins, of this function, of its caller, or (not `over`) of one that it calls.
+        """Runs to the begin of another line, of this function, of its caller, or (not `over`) of a called function.
 
         `later`: of this function only one that stands further down.
         Code without lines is passed to the next line, from before `main` wherever that is.

@@ -1,8 +1,8 @@
-"""A run as a timeline: any instruction of it can be gone to, forwards and backwards.
+"""A run as a timeline: the debugger can go to any of its instructions, forwards and backwards.
 
-A run is bits, so going back is going forward again from a saved state. A moment is a machine cycle at which the
-processor in focus stands between two instructions. States are saved at the end of each control period, and closer to
-what is looked at closely; when they take more than their budget, every second state of the older half goes.
+A run is reproducible, so going back means running forward again from a saved state. A moment is a machine cycle at
+which the processor in focus is between two instructions. States are saved at the end of each control period, and closer
+to what is looked at closely; when they take more than their budget, every second state of the older half goes.
 
     checkpoint ──► load ──► run, asking at marked instructions ──► hits ──► go to the first or the last one
 """
@@ -117,17 +117,17 @@ class Timeline:
 
     @property
     def at_begin(self) -> bool:
-        """True if it stands where the run begins: at reset, or where a saved world goes on."""
+        """True at the begin of the run: at reset, or at the tick of a saved world."""
         return self.core.cpu.cycles == self._begins[self.focus]
 
     @property
     def tick(self) -> int:
-        """Where the processor in focus stands."""
+        """The present tick of the processor in focus."""
         return self.core.cpu.cycles * CYCLE_TICKS
 
     @property
     def everywhere(self) -> Collection[int]:
-        """Where instructions may be."""
+        """Addresses of possible instructions."""
         if self.code_in_ram:
             return range(0x10000)
         return [address for first, end in self.run.image.used for address in range(first, end)]
@@ -212,7 +212,7 @@ class Timeline:
         return self._now >= tick
 
     def _settle(self) -> None:
-        """Everything else on to where the processor in focus stands: it may have gone past a tick by an instruction.
+        """Advances everything else to the processor in focus, which may have passed a tick by an instruction.
 
         The boards too, which are otherwise as far as the tick before it.
         """
@@ -239,7 +239,7 @@ class Timeline:
 
     @contextmanager
     def staying(self) -> Iterator[None]:
-        """Within it one may go anywhere; afterwards it stands where it stood."""
+        """Allows moves within the block, and returns to the present moment after it."""
         tick, focus = self.tick, self.focus
         try:
             yield
@@ -248,7 +248,9 @@ class Timeline:
             self.go_to(tick)
 
     def step(self) -> None:
-        """One instruction or interrupt entry; asleep, to the first instruction of what wakes it."""
+        """Executes one instruction or interrupt entry; a sleeping processor runs to the first instruction after it
+        wakes.
+        """
         cpu = self.core.cpu
         if cpu.idle or cpu.powered_down:
             self.find({self.focus: Trap(_WAKES, lambda core: True)})
@@ -408,6 +410,6 @@ def _name(device: Device) -> str:
 
 
 def _own_marks(device: Device) -> Callable[[], Collection[int]] | None:
-    """Where the board sets marks itself, for each run."""
+    """Addresses at which the board itself sets marks, for each run."""
     board = device.board
     return board.marks if isinstance(board, EmptyBoard) else None

@@ -376,7 +376,7 @@ class RobotPort:
         return counted if self.delays else {}  # without any, the numbers are those of later questions
 
     def _why_nobody(self, sizes: Sequence[int], first: int) -> tuple[str, str]:
-        """What arrived instead of answers, and a remedy."""
+        """Text about the characters that arrived instead of answers, and a remedy."""
         came = b"".join(sent.data for sent in self.wire[first:] if sent.direction == UP)
         problem = f"no robot of a network of {' or '.join(map(str, sizes))} answers"
         if not came:

@@ -1,4 +1,4 @@
-"""What input generators have in common. Each runs in processes with a target each, which hand inputs over as files.
+"""The base of input generators. Each runs in processes of its own, with its own target, and hands inputs over as files.
 
 This module imports no hot module: a process with a target first chooses its engine by the specification.
 """

@@ -91,7 +91,7 @@ class Target(ABC):
         return self.harness.play(program)
 
     def end_tick(self) -> int:
-        """How far the last run went."""
+        """Last tick of the last run."""
         return self.harness.now_tick
 
     def script(self, data: bytes) -> list[ScriptItem]:
@@ -128,7 +128,7 @@ class Target(ABC):
         return items + self._puts(program.count)
 
     def _puts(self, place: int) -> list[ScriptItem]:
-        """What is put before a character of the program."""
+        """The puts before a character of the program."""
         puts = [self.program.put(number) for number in range(self.program.puts)]
         begin_tick = self.harness.begin_tick + LEAD_TICKS + AHEAD_TICKS
         return [
@@ -153,7 +153,7 @@ class Target(ABC):
 
 
 def described(item: ScriptItem) -> str:
-    """One line for people."""
+    """A line of text for people."""
     if isinstance(item, Transmission):
         bad = f", bad stop bits at {', '.join(map(str, item.bad_stop))}" if item.bad_stop else ""
         return f"{item.tick}: {item.data.hex(' ')}{bad}"
@@ -171,8 +171,8 @@ FAULT_WAYS = (
     *("motor left", "motor right", "wheel left", "wheel right", "pin"),
 )
 OF_BROKEN = ("no_fault", "moves_only_when_fresh", "motors_off_ms", "answers_only_in_turn")
-"""What a robot whose hardware breaks has to keep; it need not act. With a stuck pin only the first: another one of P1
-makes it another robot, and one of the LM629's bus brings other commands there.
+"""Checks that a robot with broken hardware must pass; it need not act. With a stuck pin only the first: another one of
+P1 makes it another robot, and one of the LM629's bus brings other commands there.
 """
 _LM629_WAYS = ("busy", "dead", "ok")
 _PINS = [f"P{port}.{bit}" for port in range(4) for bit in range(8) if (port, bit) not in ((3, 0), (3, 1))]

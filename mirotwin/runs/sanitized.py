@@ -37,7 +37,7 @@ ALLOW = Option(
 
 
 class SanitizerOptions(Options, frozen=True, kw_only=True):
-    """Whether the runs of a command are watched, and which findings count."""
+    """Options: watch a command's runs with the sanitizer, and the findings that count."""
 
     HEADING = "Sanitizer"
     sanitize: Annotated[
@@ -48,7 +48,7 @@ class SanitizerOptions(Options, frozen=True, kw_only=True):
 
 
 class Allowed(msgspec.Struct, frozen=True):
-    """What a file allows: the beginning of a finding's key, with its reason and line."""
+    """An entry of an allow file: the beginning of a finding's key, with its reason and line."""
 
     key: str
     reason: str
@@ -99,7 +99,7 @@ def place_of(finding: Finding) -> dict[str, Any]:
 
 
 def line_of(finding: Finding) -> Line:
-    """What happened is a fault of the firmware, what may is a failure."""
+    """The line of a finding: an observed one is a firmware fault, a possible one a failure."""
     return ("fault" if finding.did else "failed"), f"{finding}"
 
 
@@ -141,7 +141,7 @@ class Sanitized:
                 self._pending.append((reader, sanitizer, number, device.slot if index else -1))
 
     def take(self) -> list[Finding]:
-        """What was found since the last time, one for each cause."""
+        """Findings since the last call, one for each cause."""
         self._settle()
         findings, self._found = [*self._found.values()], {}
         return sorted(findings, key=lambda finding: (not finding.did, finding))

@@ -1,4 +1,4 @@
-"""What firmware did without noticing in the runs of a test session: `pytest --mirotwin-sanitize`."""
+"""The sanitizer's findings in the runs of a test session: `pytest --mirotwin-sanitize`."""
 
 from __future__ import annotations
 

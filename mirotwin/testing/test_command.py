@@ -143,7 +143,7 @@ def _show(result: Result, options: TestOptions) -> None:
 
 
 def _summary(results: Sequence[Result]) -> str:
-    """What came of all."""
+    """The summary line of all results."""
     counted = Counter(result.verdict for result in results)
     reported = [verdict for verdict in VERDICTS if counted[verdict]]
     text = ", ".join(f"{counted[verdict]} {VERDICTS[verdict].counted}" for verdict in reported)

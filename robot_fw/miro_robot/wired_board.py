@@ -350,7 +350,7 @@ class WiredBoard(EmptyBoard):
             nets.latches[port] = latch
 
     def _before(self, tick: int) -> None:
-        """What parts do before the CPU writes at `tick`; contention on that tick is judged after the write."""
+        """Runs the parts' events before the CPU writes at `tick`; contention on that tick is judged after the write."""
         if self.nets.next_tick <= tick or self.output_tick < tick:
             self.sync(tick - 1)
             if self.nets.next_tick == tick:
@@ -413,7 +413,7 @@ class WiredBoard(EmptyBoard):
             self._note_fault(_CONTENTION, self.cpu.at, tick, detail)
 
     def _note_faults(self, tick: int) -> None:
-        """What parts have found on this tick: of several parts the first one's, where order and kind are the same."""
+        """Reports the parts' faults of this tick; of several parts with the same order and kind the first one's."""
         faults = sorted(self.nets.faults, key=_order_and_kind)
         self.nets.faults = []
         before = None

@@ -216,7 +216,7 @@ def _value(text: str, decimal: bool) -> bytes:
 
 
 def read_levels(lines: Iterator[str], facts: Facts, table: Table) -> Iterator[Change]:
-    """How the wires change, in the order of the rows."""
+    """Level changes of the wires, in the order of the rows."""
     clock = Clock(table.unit)
     last = [""] * len(table.levels)
     sample = -1

@@ -68,7 +68,7 @@ def read_again(code: bytes, first: int, variable: range, bank: int = 0) -> range
 
 
 def _to(code: bytes, address: int) -> int:
-    """Where the jump or branch there goes."""
+    """Target of the jump or branch at `address`."""
     absolute = target(code, address)
     after = address + LENGTH[code[address]]
     relative = code[(after - 1) & 0xFFFF]

@@ -297,15 +297,15 @@ class Sanitizer(Watcher):
         self.open = open_now
 
     def reader(self, source: int, key: int) -> int:
-        """Where the routine of `source` first read it; -1 if it never did."""
+        """Instruction with which the routine of `source` first read it; -1 if it never did."""
         return self.readers[source * _PLACES + key] - 1
 
     def writer(self, source: int, key: int) -> int:
-        """Where the routine of `source` first wrote it; -1 if it never did."""
+        """Instruction with which the routine of `source` first wrote it; -1 if it never did."""
         return self.writers[source * _PLACES + key] - 1
 
     def zeroer(self, source: int, key: int) -> int:
-        """Where the routine of `source` last left 0 there; -1 if it never did."""
+        """Instruction with which the routine of `source` last left 0 there; -1 if it never did."""
         return self.zeroers[source * _PLACES + key] - 1
 
     def _note(self, mistake: int, pc: int, other: int, which: int) -> None:

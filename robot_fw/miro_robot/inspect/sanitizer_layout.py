@@ -59,7 +59,7 @@ class Layout(msgspec.Struct, frozen=True, eq=False):
 
     @property
     def unseen(self) -> str:
-        """What cannot be observed without a .cdb; "" with one."""
+        """Text about findings that need a .cdb; "" with one."""
         if self.by_map:
             return "no .cdb beside it: variables are as long as its map leaves room, and overlays are not observable"
         known = self.names or self.local_names

@@ -1,4 +1,4 @@
-"""What the documents leave open, one named field per rule: the default is this twin's choice.
+"""Choices for undocumented behaviour, one named field per rule: the default is this twin's choice.
 
 If a measured chip behaves in the other way, set the other reading in a scenario's
 `[lm629]` table or as `Lm629Options(...)`. README.md in this folder says where rules come from.

@@ -251,7 +251,7 @@ class CarPart(OnShaft):
         )
 
     def echo_cm(self, tick: int, ahead_cm: float, left_cm: float, turned_deg: float) -> float:
-        """What a ranger at a place of the body, turned counter-clockwise, measures; below 0: no echo."""
+        """Distance in cm measured by a ranger at a place of the body, turned counter-clockwise; below 0: no echo."""
         self.look(tick)
         sine, cosine = dmath.sincos(self.at_rad + turned_deg * _DEGREE_RAD)
         return self.plane.echo_cm(

@@ -170,7 +170,7 @@ class DcMotorPart(Part):
             part.speed_changed(tick)
 
     def _volts(self) -> float:
-        """What drives current through winding and bridge, back-EMF left out; 0 where none flows."""
+        """Voltage that drives current through winding and bridge, without back-EMF; 0 if no current flows."""
         emf_v = self.nm_a * self.rad_s
         if self.mode == _FORWARD and emf_v < self.drive_v:
             return self.drive_v

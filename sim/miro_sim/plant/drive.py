@@ -38,7 +38,7 @@ _MOST_COUNTS = 1 << 50  # doubles still hold fractions of it
 
 
 class Decay:
-    """What share of a current is left after each number of ticks, through diodes and then through transistors."""
+    """Remaining share of a current after each number of ticks, through diodes and then through transistors."""
 
     NOT_STATE = ("*",)
 
@@ -127,7 +127,7 @@ class Winding:
                 self.drive = wanted
 
     def pass_edge(self, chip: Lm629) -> int:
-        """What `Lm629.advance` does at an edge, and the bridge's input after it. Returns the tick of the next."""
+        """Executes `Lm629.advance` at an edge, and updates the bridge's input. Returns the tick of the next edge."""
         if chip.pwm:
             chip.pwm = 0
             chip.next_tick = chip.period_tick + LONGEST_STEP

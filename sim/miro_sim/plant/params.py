@@ -1,4 +1,4 @@
-"""What a robot's drive is made of: the figures of the default robot, each with its source.
+"""The parameters of a robot's drive: the figures of the default robot, each with its source.
 
 Sources: Faulhaber 2224 006 SR catalogue figures, which close on themselves (no-load speed, stall torque and
 the 11 ms time constant follow from them); ST L298 data sheet, total saturation drop; the robot is a MiroSot
@@ -78,7 +78,7 @@ class OpticalEncoder(Ranged, frozen=True, forbid_unknown_fields=True, kw_only=Tr
 
 
 class Tyre(Ranged, frozen=True, forbid_unknown_fields=True, kw_only=True):
-    """What a wheel has of the pitch: it slips beyond `grip` times its load. Without `grip` it never does."""
+    """Friction between a wheel and the pitch: it slips beyond `grip` times its load, and never without `grip`."""
 
     grip: Annotated[float | None, Within(0.01, 10.0)] = None  # rubber on a painted board about 0.8
 

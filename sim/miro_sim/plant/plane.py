@@ -63,7 +63,9 @@ class Plane:
         return math.sqrt(least)
 
     def edge_cm(self, x: float, y: float) -> float:
-        """How far a point of the light floor is from the next edge of a line at least; of a line: that, negative."""
+        """Lower bound of the distance from a point of the light floor to the next edge of a line, in cm; negative on a
+        line.
+        """
         away = self._nearest(self.lines, self.lines_end, x, y) - self.half_cm
         if not self.rows:
             return away

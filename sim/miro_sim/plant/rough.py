@@ -51,7 +51,8 @@ _FORCE_N = ("d", -1e30, 1e30)
 
 
 class DisturbingForce:
-    """What disturbs a body: `at` puts force (N, forward) and torque (Nm, counter-clockwise) of a tick into its fields.
+    """A disturbance of a body: `at` puts force (N, forward) and torque (Nm, counter-clockwise) of a tick into its
+    fields.
 
     Noise is uniform within +- its bound and holds for a period: draws 2 k (force) and 2 k + 1 (torque) in period k.
     """
@@ -399,7 +400,7 @@ class RoughBody(Body):
         return self.grip_n if play_m >= self.play_m else 0.0
 
     def _grip_left_n(self, along_n: float) -> float:
-        """What the friction circle of a wheel leaves sideways."""
+        """The remaining sideways grip in a wheel's friction circle, in N."""
         rest = (self.grip_n - along_n) * (self.grip_n + along_n)
         return math.sqrt(rest) if rest > 0.0 else 0.0
 

@@ -36,7 +36,8 @@ _DEFAULTS = {registry.default for registry in REGISTRIES.values() if registry.de
 
 
 class Setting(msgspec.Struct, frozen=True):
-    """What a setting did. `text`: KEY=VALUE as it was given; `path`: what was set, as in errors: `network[0].host`.
+    """The effect of a setting. `text`: KEY=VALUE as it was given; `path`: what was set, as in errors:
+    `network[0].host`.
 
     `table`: the table that is the setting's as a whole, because the setting made it or chose its kind; or "".
     `option`: who made it: the command line's, or the key of a scenario file that holds settings.

@@ -1,5 +1,5 @@
-"""What somebody does to the devices and the radio of a line at a tick: reset pins, supplies, radio on and off, the
-values of a board's parts, and hardware faults.
+"""Actions on the devices and the radio of a line at a tick: reset pins, supplies, radio on and off, the values of a
+board's parts, and hardware faults.
 
 An action takes effect before anything else happens at its tick. The radio is settled a little ahead of the robots, so
 its band down changes `SETTLE_TICKS` earlier than the rest, for the same tick: RADIO_DOWN and RADIO_UP are two entries,

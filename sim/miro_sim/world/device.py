@@ -84,7 +84,7 @@ class Device:
     # Parts of a board
 
     def source(self, name: str) -> tuple[Any, str]:
-        """Who keeps the changes of a pin or value, None if nobody does, and what it is called there."""
+        """The recorder of a pin's or value's changes (None if there is none), and its name there."""
         return self.changes, name
 
     def check_put(self, path: str, value: PutValue) -> None:
@@ -142,7 +142,7 @@ class Device:
         return cpu.peek_iram(address) | cpu.peek_iram(address + 1) << 8
 
     def records(self) -> list[Any]:
-        """What observers take away and no snapshot holds, to go back to with `put_back`."""
+        """Lists that observers take and that no snapshot contains; `put_back` restores them."""
         return [list(self.board.faults), self.board.log.end]
 
     def put_back(self, records: list[Any]) -> None:

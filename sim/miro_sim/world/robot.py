@@ -120,7 +120,7 @@ class Robot(Device):
             raise _named(error, f"net{self.network}/robot{self.slot}", tick) from error
 
     def record(self, tick: int, measured: Posture | None, command: WheelCommand | None) -> RobotPeriod:
-        """What observers see of this robot at `tick`; drains the lists of completed LM629 commands."""
+        """The robot's record at `tick` for observers; drains the lists of completed LM629 commands."""
         v_m_s, w_rad_s = self.drive.velocity_at(tick)
         try:
             reference = self.pilot.reference_at(seconds(tick)).posture
