@@ -2,7 +2,7 @@
 
     python -m benchmarks.fuzz_time [--limit 60] [--seeds 3] [--engines afl hypothesis] [--only NAME ..]
     python -m benchmarks.fuzz_time --planted [--limit 20]     # the other table: mistakes of tests.mutants.planted
-    python -m benchmarks.fuzz_time --write                    # fuzz_time*.csv and docs/fuzzing.md
+    python -m benchmarks.fuzz_time --write                    # fuzz_time*.csv and docs/background/fuzzing.md
 
 Trials run one after the other, one process of the engine each. Their results stand in `build/mutants/fuzz_time.json`;
 what stands there for the same image, and was found or not within that limit, is not measured again without `--again`.

@@ -1,4 +1,4 @@
-"""What `benchmarks.fuzz_time` measured: the tables beside this file, and their part of docs/fuzzing.md."""
+"""What `benchmarks.fuzz_time` measured: the tables beside this file, and their part of docs/background/fuzzing.md."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ from benchmarks.fuzz_time_trial import ENGINES, Trial
 from tests.mutants.for_fuzzing import FOR_FUZZING
 from tests.mutants.planted import PLANTED
 
-PAGE = Path(__file__).parents[1] / "docs" / "fuzzing.md"
+PAGE = Path(__file__).parents[1] / "docs/background/fuzzing.md"
 HARD, EASY = (Path(__file__).parent / name for name in ("fuzz_time.csv", "fuzz_time_planted.csv"))
 """Mistakes that need a rare input, and the planted ones. Seconds of the engine's processor time, one number a seed; `>`
 and the limit if it had no crash; `*` is not by the check that the mistake names.

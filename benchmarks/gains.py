@@ -1,4 +1,4 @@
-"""Many searches for gains of each law, compared: `python -m benchmarks.gains --write docs/gains.md`.
+"""Many searches for gains of each law, compared: `python -m benchmarks.gains --write docs/background/gains.md`.
 
 What a search does: `benchmarks.gains_search`. This file chooses the searches, has them made, keeps what is finished in
 a journal, and writes all tables (benchmarks/gains.json), the page and its picture. The page does not depend on the
@@ -93,7 +93,9 @@ def searched(jobs: Sequence[Job], executor: Executor, journal: Journal) -> Mappi
 
 def main(arguments: list[str] | None = None) -> int:
     parser = argparse.ArgumentParser(description=(__doc__ or "").partition("\n")[0])
-    parser.add_argument("--write", type=Path, metavar="PAGE", help="docs/gains.md; left out: on the screen")
+    parser.add_argument(
+        "--write", type=Path, metavar="PAGE", help="docs/background/gains.md; left out: on the screen"
+    )
     parser.add_argument(
         "--journal", type=Path, metavar="FILE", help="keeps finished searches, to go on later"
     )

@@ -1,4 +1,4 @@
-"""The page of the gain searches, docs/gains.md, from their tables, and its picture."""
+"""The page of the gain searches, docs/background/gains.md, from their tables, and its picture."""
 
 from __future__ import annotations
 
@@ -61,11 +61,11 @@ epsilon-tracking after {first}, too.
 * The shipped gains of the paper's law, for Figs. 6 and 7 alone, have smaller errors and settle from the start of
   Fig. 9 in no run.
 
-[All tables, with the best gain sets](../benchmarks/gains.json). To run it again:
+[All tables, with the best gain sets](../../benchmarks/gains.json). To run it again:
 
 <!-- not run: {thousands} 000 runs, half an hour on two cores; tests/sim/test_gains.py has its parts -->
 ```sh
-python -m benchmarks.gains --write docs/gains.md --journal gains.jsonl
+python -m benchmarks.gains --write docs/background/gains.md --journal gains.jsonl
 ```
 
 This gives the same bytes everywhere. A stopped command goes on with the journal.
@@ -87,8 +87,8 @@ PICTURE = """\
 ONE_SET_HEAD = """\
 ## One set for Figs. 6, 7 and 9
 
-Another search found a set with which epsilon-tracking drives all three (*line* in [the paper again](reproduction.md)).
-Shipped gains / this set, medians of the runs that settle, seeds {seeds}:
+Another search found a set with which epsilon-tracking drives all three (*line* in
+[the paper again](../reproduction.md)). Shipped gains / this set, medians of the runs that settle, seeds {seeds}:
 """
 
 

@@ -22,7 +22,7 @@ DOCS = ROOT / "docs"
 MODULES = {
     "theory.md": ("tests.sim.theory_page", "--write"),
     "benchmark.md": ("benchmarks.bench2", "--run", "--write", "docs/benchmark.md"),
-    "gains.md": ("benchmarks.gains", "--write", "docs/gains.md"),
+    "gains.md": ("benchmarks.gains", "--write", "docs/background/gains.md"),
 }
 REPRODUCTION = "reproduction.md"
 PAGES = (REPRODUCTION, *MODULES)

@@ -1,4 +1,4 @@
-"""The tables of fuzz_time and docs/fuzzing.md: what a trial becomes, and that they have each mistake as it is now."""
+"""The tables of fuzz_time and docs/background/fuzzing.md: what a trial becomes, and each mistake as it is now."""
 
 import csv
 import io

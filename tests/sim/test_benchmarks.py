@@ -20,7 +20,7 @@ from mirotwin.campaign.single import run_single
 from tests.sim.world.rig import finished, image, world_of
 
 ROOT = Path(__file__).parents[2]
-PAGE = ROOT / "docs/disturbances.md"
+PAGE = ROOT / "docs/background/disturbances.md"
 
 
 def stored(name):
@@ -40,7 +40,7 @@ def test_the_table_of_the_eye_has_each_case_and_the_page_has_rows_of_it():
     assert head == list(vision.COLUMNS)
     assert [row[0] for row in rows] == list(vision.cases())
     known = {row[0]: [row[1], row[3], row[4], row[6]] for row in rows}
-    _, *shown = rows_of(ROOT / "docs/vision.md")
+    _, *shown = rows_of(ROOT / "docs/background/vision.md")
     assert shown
     for name, *cells in shown:
         assert known[name] == cells

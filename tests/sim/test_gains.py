@@ -37,7 +37,7 @@ from benchmarks.gains_tables import LAWS, MEASURES, ONE_SET, tables_of
 from miro_sim.scenario.file import load
 from mirotwin.campaign.reproduce.stored_tables import read
 
-PAGE = Path(__file__).parents[2] / "docs/gains.md"
+PAGE = Path(__file__).parents[2] / "docs/background/gains.md"
 STORED = read(gains_tables.DATA)
 SMALL = Budget(explored=6, first=4, second=5)
 RUNS = st.lists(st.builds(Outcome, st.booleans(), st.floats(0.0, 3.0)), min_size=3, max_size=3)

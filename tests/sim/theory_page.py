@@ -1,4 +1,4 @@
-"""Writes measured numbers into docs/theory.md and the radio's README: `python -m tests.sim.theory_page --write`.
+"""Writes numbers into docs/background/theory.md and the radio's README: `python -m tests.sim.theory_page --write`.
 
 The prose is the pages' own. Each of `QUOTES` is a sentence of a page, with `{}` where a number stands, and what
 measures these numbers. Each of `TABLES` is a CSV file; some columns of one of them stand between marks on the page.
@@ -23,7 +23,7 @@ from tests.host.theory import claims, ideal
 from tests.sim import theory_in_the_loop as loop
 
 ROOT = Path(__file__).parents[2]
-THEORY = ROOT / "docs/theory.md"
+THEORY = ROOT / "docs/background/theory.md"
 RADIO = ROOT / "sim/miro_sim/radio/README.md"
 SEEDS = 20
 STARTS = 120
@@ -187,7 +187,7 @@ def from_random_starts(law, kind):
 
 
 class Table(NamedTuple):
-    """A CSV file, what measures its rows, and those columns that docs/theory.md shows between marks; none: no marks."""
+    """A CSV file, what measures its rows, and those columns that its page shows between marks; none: no marks."""
 
     path: Path
     rows: Callable[[], list[list[str]]]

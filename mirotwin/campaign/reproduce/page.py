@@ -33,8 +33,8 @@ rows.csv with a row for each run.
 
 The paper gives neither gains, paths, speeds, origin nor the cause of its 2.40 cm. Chosen here:
 
-* The paper's law has one set of gains for Figs. 6 and 7 and one for Fig. 8, found by [a search](gains.md), checked on
-  seeds 1000 to 1099, then frozen.
+* The paper's law has one set of gains for Figs. 6 and 7 and one for Fig. 8, found by
+  [a search](background/gains.md), checked on seeds 1000 to 1099, then frozen.
 * The camera has a calibration that is wrong by up to 2.40 cm (`1997`).
 * Epsilon-tracking is reconstructed (`host/miro_host/laws/epsilon_tracking.py`). Of its gains *theory* obeys its theory,
   *illustrative* looks like the paper's Fig. 9, *retuned* (the defaults) and *line* (for the straight line) were found
