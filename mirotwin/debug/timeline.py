@@ -214,7 +214,7 @@ class Timeline:
     def _settle(self) -> None:
         """Advances everything else to the processor in focus, which may have passed a tick by an instruction.
 
-        The boards too, which are otherwise as far as the tick before it.
+        Boards are synced too; otherwise they are one tick behind.
         """
         if not self.run.over:
             self.run.to(self.tick)

@@ -292,7 +292,7 @@ class Uart:
         while self.rx_next < tick and self.rx_count:
             state = self.rx_count & _COUNTER_BITS
             now = self.rx_next
-            # Only where no vote of this bit has been taken.
+            # Whole bits can be skipped only before the vote of state 7 or after state 10.
             if (state <= _VOTE_FIRST or state > _ACTION) and self._unanimous(tick):
                 continue
             if state < _VOTE_FIRST or state > _ACTION:
@@ -301,7 +301,7 @@ class Uart:
                     idle = (tick - 1 - now) // period + 1
                 self.rx_count += idle
                 self.rx_next = now + idle * period
-                # Also where ticks are skipped: after a start bit that was noise the search goes on from it.
+                # Kept up to date when skipping, too: after a start bit that was noise the search continues from it.
                 self.rx_last = self.level(self.rx_next - period)
                 continue
             level = self.level(now)
@@ -314,25 +314,28 @@ class Uart:
                 self._act(now)
 
     def _unanimous(self, tick: int) -> bool:
-        """Bits below `tick` whose three votes are one: the start bit, or all data. False if the next bit is none."""
+        """Takes bits below `tick` at once whose three samples agree: the start bit, or data to the last bit.
+
+        False if the next bit needs its votes one by one.
+        """
         period = self.rx_period
         idle = (_VOTE_FIRST - self.rx_count) & _COUNTER_BITS
         first = self.rx_next + idle * period
         number = (self.rx_count + idle) >> 4
         # At most to the last bit: it decides what comes next, as the start bit does by itself.
         most = _LAST_BIT + 1 - number if 1 <= number <= _LAST_BIT else 1
-        # The wire is asked, and P3.0 holds the pin low whatever that does.
+        # `samples` knows only the wire; while P3.0 is low, the pin is low regardless.
         if not self.latch & 1:
             return False
         sampled = self.rxd.samples(first, _ROLLOVERS * period, 3 * period, tick, most)
-        more = (sampled >> 16) - 1  # than one bit
+        more = (sampled >> 16) - 1  # bits after the first; bits 0 to 15 are their levels
         if more < 0:
             return False
         level = sampled >> more & 1
         self.rx_last = level
         self.rx_votes = 3 * level
         self.rx_bits |= (sampled & ((1 << more) - 1)) << number >> 1
-        self.rx_count += idle + 4 + _ROLLOVERS * more
+        self.rx_count += idle + 4 + _ROLLOVERS * more  # 4: states 7 to 10 of the last bit
         self.rx_next = first + (4 + _ROLLOVERS * more) * period
         self._act(self.rx_next - period)
         return True

@@ -170,7 +170,7 @@ class Waits:
             return until_tick, []
         tick = max(first[0], begun_tick)
         self._again_to(watch, before, tick)
-        # An event shows in a run to its own tick only if its machine cycle began before that.
+        # A run to tick t executes only cycles that begin before t: an event of a cycle that begins at t needs t + 1.
         if any(key == first for key, _ in self.backlog):
             return tick, []
         if event.what == "reached":  # the CPU stands before it and has not looked at it again
