@@ -150,7 +150,7 @@ def search(
 
     `branches(n)`: the branches at the end of control period n; `end`: the control periods after which the check has
     failed. The search begins with about `coarse` points. It then halves the interval after the last point below one
-    half until that interval is one control period. The index is -1 if the rate was above one half from the start.
+    half until that interval is one control period. The index is -1 if no first point is below one half.
     """
     points: dict[int, Point] = {}
 

@@ -51,8 +51,8 @@ def as_kind(value: Value, kind: type) -> Any:
 class Level(msgspec.Struct, frozen=True):
     """A level of a factor: its value in the column, and the settings that it makes.
 
-    `settings`: KEY=VALUE, as `--set`. `scenario`, `firmware`: replace the campaign's own; "" keeps it. `place`: file
-    and line, for errors.
+    `settings`: KEY=VALUE, as `--set`. `scenario`, `firmware`: replace the campaign's own; "" keeps it. `place`: key
+    path in the campaign's file, or the option, for errors.
     """
 
     value: Value

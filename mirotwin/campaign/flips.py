@@ -1,8 +1,8 @@
 """Bit flips in RAM: a factor of a campaign (`--flips`), and the effect of each flip, by variable.
 
 A flip is compared with the run of the same seed and levels without one. No effect: the state was the same at the end of
-every control period. Latent: all figures are the same, the flipped value was never read. Within 1 mm: the root mean
-square of the position's error in the last second.
+every control period. Lies there: all figures are the same, the flipped value was never read. Within 1 mm: the root
+mean square of the position's error in the last second.
 """
 
 from __future__ import annotations
@@ -73,7 +73,7 @@ def variable_names(image: Image) -> dict[int, str]:
 
 
 def classes(rows: ResultRows) -> dict[str, Counter[str]]:
-    """Variable -> count of flips by effect; variables with most flips that moved the robot first."""
+    """Variable -> count of flips by effect; most errors first, then faults, failures, other movements."""
     flips, keys = rows.column(FLIP), rows.keys(without=FLIP)
     without = {key: row for row, key in enumerate(keys) if flips[row] == NONE}
     columns = {name: rows.column(name) for name in FIGURES if name in rows.table.column_names}

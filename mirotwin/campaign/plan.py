@@ -134,7 +134,7 @@ class Plan(msgspec.Struct, frozen=True):
         )
 
     def varied(self, run: int) -> dict[str, Value]:
-        """The varied columns of a run: factors, drawn keys and seed."""
+        """The columns of a run that its plan gives: factors, drawn keys, number of the draw, and seed."""
         point = self.design.point(run)
         levels: dict[str, Value] = {
             factor.name: level.value for factor, level in zip(self.design.factors, point.levels, strict=True)

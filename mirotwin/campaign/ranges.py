@@ -36,7 +36,7 @@ class Choice(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
 
 
 def is_range(value: Any) -> bool:
-    """True if this table is a range, not a table of further keys."""
+    """True for a range, and for a value that is not a table; False for a table of further keys."""
     return not isinstance(value, dict) or any(key in value for key in ("from", "to", CHOOSE))
 
 

@@ -86,7 +86,7 @@ def about(plan: Plan) -> ResultsInfo:
 
 
 def _elsewhere(level: Level) -> Level:
-    """The level without settings that are specific to this machine."""
+    """The level without its place, and with the names of scenario and firmware instead of their paths."""
     names = {"scenario": _name(level.scenario), "firmware": _name(level.firmware)}
     return msgspec.structs.replace(level, place="", **names)
 

@@ -19,8 +19,8 @@ COLUMNS = ("at", "fail", "of", "share", "95 % interval")
 
 class Curve(msgspec.Struct, frozen=True, kw_only=True):
     """The failure rate of `run`'s branches at each of the `points`. `what`: name of the failure. `low`: index of the
-    control period in which the rate passes one half, -1 if it is above one half from the start. `others`: runs of other
-    seeds, with other wheels and another calibration. `clock`: ticks per second.
+    control period in which the rate passes one half, -1 if it is at least one half from the start. `others`: runs of
+    other seeds, with other wheels and another calibration. `clock`: ticks per second.
     """
 
     run: str

@@ -47,7 +47,7 @@ NOT_OBSERVABLE = {id: why for why, ids in _REASONS.items() for id in ids.split()
 SHORTEST_US = 5000.0
 """A pause that a PC can make within a frame."""
 SURE_TICKS = 5 * TICKS_PER_MS
-"""Timing uncertainty up to which a trial is judged.
+"""Timing uncertainty up to which the failure of a trial counts.
 
 Chosen: half of the time in which a robot must act, a quarter of the shortest margin of the silences.
 """

@@ -63,7 +63,7 @@ def _collapsed(rows: list[Row]) -> Iterator[Row]:
 
 
 def _verdict(expected: TrialExpectation, observed: Observed) -> Row:
-    """The row of an expectation: at the tick of its failure, or at the tick at which it was fulfilled."""
+    """The row of an expectation: at the tick of its failure, or, if it was fulfilled, at its end."""
     failure = expected.found(observed)
     if failure is None:
         return expected.tick, "passed", expected.wanted

@@ -82,7 +82,10 @@ def _other_layout(script: TrialScript) -> TrialScript:
 
 
 def _begins_again(listener: Listener) -> str:
-    """True if the firmware has reset LM629s that it had ordered to turn. The trial resets no processor."""
+    """A text if the firmware has reset LM629s that it had ordered to turn, else "".
+
+    The trial resets no processor.
+    """
     turned_tick = min(
         (command.tick for command in listener.observed.commands if command.opcode == _STT), default=None
     )
@@ -107,7 +110,7 @@ def _serial_port(events: Sequence[Event], frame: Frame) -> str:
 
 
 def why_lost(rule: Rule, network: int, image: Image, seed: int) -> str:
-    """True if a robot's serial port did not take all characters of the rule's trial, or its program did no more."""
+    """A text if a robot did not take all characters of the rule's trial, or its program hangs; else ""."""
     trial = trial_of(rule)
     if rule.topologies[network].keyed or not all(isinstance(event, Transmission) for event in trial.script):
         return ""  # noise, or a robot that was off

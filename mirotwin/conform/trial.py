@@ -1,7 +1,7 @@
 """A rule's trial: its world, the frames sent, and the expectations.
 
-Robots are placed far apart; the radio has no errors; there is no camera, because no host steers. A trial depends on its
-rule only: the seed changes the noise on RXD between keyed frames, and nothing else.
+Robots are placed far apart; the radio has no errors; the camera sees nothing, because no host steers. A trial depends
+on its rule only: the seed changes the noise on RXD between keyed frames, and nothing else.
 """
 
 from __future__ import annotations

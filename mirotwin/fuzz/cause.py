@@ -72,7 +72,7 @@ class CauseWatcher(Watcher):
         self._frames.append((cpu.sp, back))
 
     def _came_from_no_call(self, cpu: Cpu) -> bool:
-        """True if a return jumped to an address that no call pushed."""
+        """True if a return jumped to where no path through the code leads and before which no call stands."""
         return cpu.pc not in self._unwinder.heights and self._unwinder.call_before(cpu.pc) < 0
 
 

@@ -34,8 +34,8 @@ def inputs(
 ) -> Bytes:
     """Inputs of that kind ("bytes", "frames", "session") for robot `slot` of `robots`.
 
-    `foreign`: frames have a wire format unknown here: a count byte and that many bytes. `seeds`: half of the inputs
-    begin with one of them. `puts`: a session may put values of parts and levels on pins.
+    `foreign`: frames have a wire format unknown here: a byte with the count less one, and the bytes. `seeds`: half of
+    the inputs begin with one of them. `puts`: a session may put values of parts and levels on pins.
     """
     if kind == "session" and puts:
         put, pin = (st.binary(min_size=3, max_size=3).map(code.__add__) for code in (PUT, PIN))
@@ -131,5 +131,5 @@ def _exactly(size: int) -> Bytes:
 
 
 def _counted() -> Bytes:
-    """A count byte and that many bytes."""
+    """A byte with the count less one, and the bytes."""
     return st.binary(min_size=1, max_size=32).map(lambda some: bytes([len(some) - 1]) + some)

@@ -1,6 +1,6 @@
 """Coverage of a campaign and of single inputs, and the causes of failed runs. The campaign's own target counts edges at
 full speed. This module uses a second target of the same image that counts instructions, some fifty times slower; it
-runs only inputs with new edges.
+runs only inputs that found something new, and inputs that failed.
 """
 
 from __future__ import annotations

@@ -28,7 +28,7 @@ SUMMARY = "summary.json"
 
 
 class CampaignResults:
-    """Results of a finished campaign. `unexamined`: number of inputs left; `complete`: it ran for its full time.
+    """Results of a finished campaign. `unexamined`: number of inputs left; `complete`: no interrupt, no error.
 
     `in_files`: the checks of --expect that are in a file, by their name, as FILE.py:CLASS; `plugins`: parts of --part.
     """

@@ -286,7 +286,7 @@ class Board(ProcessorBoard):
             self.probe.moved(tick)
 
     def _note_stuck(self) -> None:
-        """Marks the shorted pins that are wired to something; the effect on other pins cannot be observed."""
+        """Marks the shorted pins that the board watches; a short of another pin reaches the CPU alone."""
         self.stuck = 0
         for port in range(PORTS):
             self.low_pins[port] = self.stuck_low[port] & self.watched[port]

@@ -31,7 +31,11 @@ def end(name):
             ended = bare_adapter.run_case(bare_runs.CASES_OF_TARGETS[of], Path(folder))
         else:
             ended = bare_adapter.run_image(bare_runs.RUNS[of], Path(folder))
-    cpu = sorted((path, value) for path, value in ended.cpu.items() if not _is_line(path))
+    cpu = sorted(
+        (path, value)
+        for path, value in ended.cpu.items()
+        if not _is_line(path) and not _is_no_short(path, value)
+    )
     seen = repr((cpu, ended.xram.hex(), ended.sent, ended.faults))
     return {
         "ended": f"{ended.why} at cycle {ended.cycles}",
@@ -43,6 +47,11 @@ def end(name):
 
 def _is_line(path):
     return any(f".{line}." in path for line in ("rxd", "txd"))
+
+
+def _is_no_short(path, value):
+    """True for the field of a pin's hardware fault, which no run here has; one that is set stays."""
+    return path.endswith((".short1", ".short3")) and value == 0
 
 
 def names():

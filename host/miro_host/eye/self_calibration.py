@@ -43,7 +43,7 @@ GATE = 4.0
 STRIDE = 29
 """From one mark to the next: prime to their number, so that marks all over the picture follow each other."""
 SETTLED_FRAMES = 150
-"""Frames in which every mark is examined; later only in one frame of `SELDOM`."""
+"""First frames, each of which examines one mark; later only one frame in `SELDOM` examines one."""
 SELDOM = 8
 TOLD_FRAMES = 15
 NEAR_M = 0.15

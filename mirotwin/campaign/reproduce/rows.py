@@ -102,7 +102,10 @@ def percentile(rows: Sequence[RunRow], name: str, share: float) -> float | None:
 
 
 def middle_seeds(table: Table) -> dict[str, int]:
-    """Group -> the seed with the median error (of an even number, the lower middle one); empty if all failed."""
+    """Group -> the seed with the median error (of an even number, the lower middle one).
+
+    A group whose runs all failed is left out.
+    """
     middles = {}
     for label, rows in table.items():
         ordered = sorted((row.rms_position_cm, row.seed) for row in rows if row.rms_position_cm is not None)

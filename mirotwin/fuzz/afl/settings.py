@@ -13,7 +13,7 @@ from mirotwin.shell.processes import python_module
 
 PROGRAM = "afl-fuzz"
 ANSWER_MS = 10_000
-"""Time limit of one execution. The server always answers at once (`serve`), so AFL++ never sees it expire."""
+"""Time limit of one execution. The server answers after the run, all at once (`serve`): AFL++ never sees it expire."""
 
 START_MS = 120_000
 """Time for a target to start: Python, the modules and the boot of the firmware, on a machine that does other things."""

@@ -375,7 +375,7 @@ class StreamStep(OfRobot, frozen=True, kw_only=True):
 
 
 class ConditionStep(Step, frozen=True, kw_only=True):
-    """Base of steps that wait for events."""
+    """Base of steps with a condition: `wait_for`, `expect`, `never`, `hold`, `silence_for_ms`."""
 
     CHANGES = False
 

@@ -309,7 +309,7 @@ class Player:
         self.checks.append(Checks(self.world, dict.fromkeys(places, checks)))
 
     def break_hardware(self, fault: Fault, name: str) -> None:
-        """Breaks hardware as soon as possible; a break without a repair must change something in the run."""
+        """Breaks or repairs hardware as soon as possible; each break must change something, a repair need not."""
         Proof.begin(self.proofs, self.world, name, fault)
         self.machine.do(fault)
 

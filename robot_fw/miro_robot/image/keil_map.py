@@ -223,7 +223,7 @@ class _Reader:
     def function_in(
         self, number: int, segment: KeilSegment, code: list[tuple[int, str]]
     ) -> tuple[CodePlace, int] | None:
-        """First and last address of a segment's function; None for assembler code, which has labels.
+        """A segment's function, and the address after its end; None for assembler code, which has labels.
 
         Its name is written there in capitals. The optimizer may put code (`L?0038`) in front of it.
         """

@@ -143,8 +143,8 @@ class Reader:
         torn = {(first, both[0]) for (kind, first, _), both in seen.pairs.items() if kind == TORN_READ}
         torn |= {(first, key) for (kind, first, _), (_, _, key) in seen.events.items() if kind == TORN_READ}
         sizes = Counter(key for _, key in self.layout.places.values())
-        loops: dict[int, list[range]] = {key: [] for _, key in torn}
-        for first, key in torn:
+        loops: dict[int, list[range]] = {key: [] for _, key in sorted(torn)}
+        for first, key in sorted(torn):
             bytes_of_it = range(key, key + sizes[key])
             loops[key] += [read_again(self.code, first, bytes_of_it, bank) for bank in (0, 8, 16, 24)]
         return loops

@@ -153,7 +153,7 @@ class Cpu(Chip):
         return self.blocked == self.cycles or self.peripherals.interrupts.choose(self.cycles) < 0
 
     def _note_end(self, now: int) -> None:
-        """True if a mark, or sleep that nothing known ends, ends the run at the start of cycle `now`."""
+        """Sets `stop` if a mark, or sleep that nothing known ends, ends the run before cycle `now`."""
         if not self.idle and not self.powered_down:
             if self.lines[self.pc] & _MARK:
                 self.stop = _BREAKPOINT

@@ -194,7 +194,7 @@ class Timer2:
         self._note_sleep()
 
     def _note_sleep(self) -> None:
-        """True if no flag is near: overflows set none, and no fall of T2EX waits."""
+        """Sets `sleeps`: 1 if no flag is near (overflows set none, and no fall of T2EX waits), else 0."""
         self.sleeps = 1 if self.silent() and self.up != _FELL else 0
 
     def falls(self) -> int:

@@ -69,7 +69,7 @@ class PartKeys(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_only=
 
     @property
     def pulled_up(self) -> tuple[str, ...]:
-        """Pins that the part itself pulls up to VCC with a resistor, so nothing else needs to drive them high."""
+        """Pins that the part itself pulls up to VCC, as a resistor would: nothing else needs to drive them high."""
         return ()
 
     @property

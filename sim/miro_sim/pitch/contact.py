@@ -1,4 +1,4 @@
-"""True if robots touch: squares seen from above, checked at the ticks of a grid in time.
+"""Decides if robots touch: squares seen from above, checked at the ticks of a grid in time.
 
 Pushing will need the robots at one tick, so the grid is where they meet.
 

@@ -47,5 +47,5 @@ class PictureSettings(msgspec.Struct, frozen=True, forbid_unknown_fields=True, k
 
 
 def checked(settings: PictureSettings) -> PictureSettings:
-    """Returns itself. Raises ValueError for a value out of range, which a program can give."""
+    """Returns an equal copy. Raises ValueError for a value out of range, which a program can give."""
     return msgspec.convert(msgspec.to_builtins(settings), PictureSettings)

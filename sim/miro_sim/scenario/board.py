@@ -36,7 +36,7 @@ class OtherBoard(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_onl
 
 
 def check_board(path: str, boards: Collection[str], key: str = "") -> None:
-    """For several boards the file must have the board's name in front. Raises ValueError, which begins with `key`."""
+    """Raises ValueError, which begins with `key`, unless `path` begins with the name of one of several boards."""
     name = path.partition(".")[0]
     if name not in boards:
         remedy = did_you_mean(name, boards) or f"write {next(iter(boards))}.{path}"

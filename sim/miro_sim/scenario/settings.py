@@ -271,7 +271,7 @@ def _robot_near(key_path: str, raw: Table) -> tuple[str, str]:
 
 
 def blamed(error: ScenarioError, settings: Sequence[Setting], raw: Table) -> ScenarioError:
-    """The error, naming the setting that it concerns, or all settings if only together they failed.
+    """The error, naming the setting that it concerns, or all settings if it concerns none of them.
 
     `raw`: the tables in which they were made.
     """

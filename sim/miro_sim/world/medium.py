@@ -178,7 +178,7 @@ class Medium:
         raise NotImplementedError
 
     def vision_counts(self) -> dict[str, int]:
-        """Counts of frames and robots that this network's camera missed; empty without a camera."""
+        """Counts of this network's camera (`Sight.counts`); empty without one that can lose anything."""
         return {}
 
     # Going back, and loading
