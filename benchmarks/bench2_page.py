@@ -91,10 +91,12 @@ def _leaders(rows: Rows) -> Iterator[str]:
     for entry in order:
         cells = [entry]
         for board in boards:
-            place, one = next((place, one) for place, one in enumerate(board, start=1) if one.entry == entry)
-            errors = (one.errors[figure] for figure in FIGURES)
+            place, score = next(
+                (place, score) for place, score in enumerate(board, start=1) if score.entry == entry
+            )
+            errors = (score.errors[figure] for figure in FIGURES)
             text = "/".join("-" if error is None else f"{error.median:.2f}" for error in errors)
-            cells += [f"{place}", f"{one.settled}", text]
+            cells += [f"{place}", f"{score.settled}", text]
         lines.append(cells)
     widths = [max(map(len, column)) for column in zip(*lines, strict=True)]
     yield "```text"

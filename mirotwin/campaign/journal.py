@@ -73,7 +73,7 @@ class Journal:
         """Writes the outcome of a run; a second one of the same run is left out."""
         if self.done[outcome.run]:
             return
-        # Counted only after this: a run whose line a full disk refused stays missing, and is done again.
+        # Counted only after this: a run whose line a full disk refused stays missing, and runs again.
         self._append(json_bytes(outcome) + b"\n")
         self._count(outcome.run)
         # Not each time: waiting for the disk takes longer than many a run.
@@ -85,9 +85,8 @@ class Journal:
         """Writes a whole line or nothing. Raises OSError."""
         begin, written = self._stream.seek(0, os.SEEK_END), 0
         try:
-            while written < len(
-                line
-            ):  # a disk that fills up takes the beginning of a line, and says so only next time
+            # A disk that fills up takes the beginning of a line, and reports it only at the next write.
+            while written < len(line):
                 written += self._stream.write(line[written:])
         except BaseException:
             self._stream.truncate(begin)  # else the next line would be glued to the cut one

@@ -84,9 +84,8 @@ def layout_of(image: Image) -> Layout:
         for variable in each
         if variable.space in ("iram", "xram")
     ]
-    for variable in sorted(
-        kept, key=lambda variable: not variable.local
-    ):  # where both claim a byte, the whole program's wins
+    # Locals first: where both claim a byte, the whole program's variable overwrites them.
+    for variable in sorted(kept, key=lambda variable: not variable.local):
         base = variable.address + (XRAM if variable.space == "xram" else 0)
         if variable.local:
             for place in range(base, base + variable.type.size):
